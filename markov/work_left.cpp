@@ -6,8 +6,8 @@
 namespace metastable::markov {
 namespace {
 
-constexpr double kTelling = 0.05;     // of a stage: so much of it tells how fast it goes
-constexpr double kUnfinished = 0.02;  // of a stage: so much is left at least while it is not finished
+constexpr double telling_share = 0.05;  // of a stage: so much of it tells how fast it goes
+constexpr double unfinished = 0.02;     // of a stage: so much is left at least while it is not finished
 
 }  // namespace
 
@@ -41,9 +41,9 @@ double WorkLeft::share() const {
   double left = 0;
   for (std::size_t i = current_; i < stages_.size(); ++i) {
     const Stage& stage = stages_[i];
-    const bool telling = i == current_ && stage.done > 0 && stage.done >= kTelling * stage.units;
+    const bool telling = i == current_ && stage.done > 0 && stage.done >= telling_share * stage.units;
     const double each = telling ? (passed - began_) / stage.done : stage.seconds_per_unit;
-    left += each * std::max(stage.units - stage.done, kUnfinished * stage.units);
+    left += each * std::max(stage.units - stage.done, unfinished * stage.units);
   }
   return passed + left > 0 ? passed / (passed + left) : 0;
 }

@@ -167,8 +167,8 @@ set(samples
   "reports/commands/a.h|reports/command_line/cli.h|no" "reports/command_line/a.h|reports/commands/request.h|yes"
   # The narrower lines.
   "analysis/experiment/a.h|analysis/study/setting.h|yes"        "analysis/experiment/a.h|analysis/study/metastability.h|no"
-  "analysis/experiment/reality.h|dynamics/laboratory/laboratory.h|yes" "analysis/experiment/experiment.cpp|dynamics/laboratory/laboratory.h|no"
-  "analysis/experiment/reality.h|dynamics/laboratory/rolling_motion.h|no"
+  "analysis/experiment/laboratory_experiment.h|dynamics/laboratory/laboratory.h|yes" "analysis/experiment/experiment.cpp|dynamics/laboratory/laboratory.h|no"
+  "analysis/experiment/laboratory_experiment.h|dynamics/laboratory/rolling_motion.h|no"
   "analysis/blind/a.cpp|dynamics/laboratory/laboratory.h|no"    "analysis/diagnosis/a.cpp|dynamics/laboratory/laboratory.h|no"
   "reports/commands/a.cpp|dynamics/laboratory/laboratory.h|no"  "analysis/wheel_model/a.h|analysis/fitting/transition_model.h|yes"
   "analysis/experiment_model/diagnose.h|analysis/diagnosis/diagnosis.h|yes"

@@ -74,8 +74,8 @@ Setting base_setting(dynamics::Law law) {
   return setting;
 }
 
-std::vector<RealityCondition> draw_conditions(const Setting& base, BlindDice& dice) {
-  std::vector<RealityCondition> conditions = stand_in_conditions(base);
+std::vector<LaboratoryCondition> draw_conditions(const Setting& base, BlindDice& dice) {
+  std::vector<LaboratoryCondition> conditions = stand_in_conditions(base);
   const double few = dice.uniform();
   if (few < 0.35) conditions.erase(conditions.begin() + dice.whole(0, 2));
   if (few < 0.1) conditions.erase(conditions.begin() + dice.whole(0, 1));
@@ -281,7 +281,7 @@ BlindCase blind_case(const BlindPlan& plan, int number, std::uint64_t seed, cons
   design.reality.restitution_skewness = truth.skewness;
   design.reality.effects = truth.effects;
   const dynamics::LaboratorySetup setup = laboratory_setup(design.conditions, design.reality);
-  made.files = reality_files(design.conditions, setup, run_laboratory(setup, 1), folder);
+  made.files = laboratory_files(design.conditions, setup, run_laboratory(setup, 1), folder);
   if (plan.kind == BlindKind::left_out) {
     truth.left_out = plan.effects;
     for (const dynamics::EffectInfo& info : dynamics::effect_catalogue())

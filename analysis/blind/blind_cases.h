@@ -68,7 +68,7 @@ struct BlindTruth {
 /// Holds a case as it is written: public files, and the truth.
 struct BlindCase {
   BlindTruth truth;
-  RealityFiles files;
+  LaboratoryFiles files;
   std::vector<std::string> catalogue;  ///< ids the diagnosis may use; empty: all
 };
 

@@ -5,15 +5,15 @@
 #include <vector>
 
 #include "analysis/experiment/experiment.h"
-#include "analysis/experiment/reality.h"
+#include "analysis/experiment/laboratory_experiment.h"
 #include "analysis/fitting/transition_model.h"
 
 namespace metastable::analysis {
 
 /// Describes an experiment in the laboratory, with what its folder tells.
 struct PowerDesign {
-  std::vector<RealityCondition> conditions;  ///< stated; contact as it truly is
-  RealityOptions reality;                    ///< without effects of the catalogue
+  std::vector<LaboratoryCondition> conditions;  ///< stated; contact as it truly is
+  LaboratoryOptions reality;                    ///< without effects of the catalogue
   std::vector<std::string> dropped;
 };
 

@@ -7,7 +7,7 @@
 #include <string_view>
 
 #include "analysis/experiment/experiment.h"
-#include "analysis/experiment/reality.h"
+#include "analysis/experiment/laboratory_experiment.h"
 #include "dynamics/catalogue/effect_catalogue.h"
 
 namespace metastable::analysis {

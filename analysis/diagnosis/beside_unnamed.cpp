@@ -5,9 +5,9 @@
 #include <mutex>
 #include <optional>
 
+#include "analysis/fitting/bayes_factor.h"
 #include "analysis/fitting/effect_fit.h"
 #include "analysis/fitting/effect_scan.h"
-#include "analysis/fitting/evidence.h"
 #include "markov/parallel.h"
 
 namespace metastable::analysis {

@@ -12,21 +12,21 @@
 
 #include "analysis/diagnosis/at_work.h"
 #include "analysis/diagnosis/beside_unnamed.h"
+#include "analysis/diagnosis/detectability.h"
 #include "analysis/diagnosis/diagnosis_sentences.h"
 #include "analysis/diagnosis/gap_tests.h"
 #include "analysis/diagnosis/machine_steps.h"
 #include "analysis/diagnosis/missing_columns.h"
+#include "analysis/diagnosis/not_possible.h"
 #include "analysis/diagnosis/parameter_estimates.h"
-#include "analysis/diagnosis/too_few.h"
 #include "analysis/diagnosis/verdict.h"
-#include "analysis/diagnosis/visibility.h"
+#include "analysis/fitting/bayes_factor.h"
 #include "analysis/fitting/cause_ranking.h"
-#include "analysis/fitting/evidence.h"
 #include "analysis/gap/collision_profile.h"
+#include "analysis/gap/facet_evidence.h"
 #include "analysis/gap/fitted_variations.h"
 #include "analysis/gap/gap_map.h"
 #include "analysis/gap/gap_shrinkage.h"
-#include "analysis/gap/left_over.h"
 #include "analysis/statistics/interval_95.h"
 
 namespace metastable::analysis {
@@ -222,7 +222,7 @@ Fitted fit_models(const TransitionModel& model, const std::vector<const Candidat
     fitted.ranking = rank();
   }
   // What the data hold no information on is not decided, whatever its evidence.
-  const std::vector<Visibility> visible = visibility(fitted.ranking.scan, candidates, options.rules);
+  const std::vector<Detectability> visible = detectability(fitted.ranking.scan, candidates, options.rules);
   std::vector<RankedCause>& singles = fitted.ranking.singles;
   for (std::size_t i = 0; i < singles.size(); ++i)
     if (singles[i].not_decided.empty() && !candidates[i]->parameters.empty() && visible[i].smallest == 0)
@@ -351,7 +351,7 @@ Diagnosis answer(const TransitionModel& model, const Fitted& fitted, const std::
   Diagnosis d;
   d.rules = options.rules;
   d.data = described_data(model);
-  d.limits.visible = visibility(fitted.ranking.scan, candidates, d.rules);
+  d.limits.visible = detectability(fitted.ranking.scan, candidates, d.rules);
   FoundGap found = find_gap(model, fitted, candidates.size(), options, progress);
   std::ranges::move(notes_on_roughness(fitted, d.data), std::back_inserter(d.data.notes));
   d.gap = found.gap;
@@ -386,7 +386,7 @@ Diagnosis answer(const TransitionModel& model, const Fitted& fitted, const std::
   d.shrinkage.profile = collision_profile(model, fitted.given.nuisance, cause, options.seed);
   progress(0.93, "what could not be seen");
   d.limits.missing = missing_columns(model, fitted.recalibrated, candidates, d.rules, options.threads, options.seed);
-  d.limits.not_possible = too_few(model, d, options);
+  d.limits.not_possible = not_possible(model, d, options);
   if (d.verdict == Verdict::explained && d.causes.set.size() > 1 && second)
     d.limits.next = next_experiments(model, best->fit, second->terms, options.threads, options.seed);
   progress(1, "done");

@@ -14,9 +14,9 @@
 #include "analysis/fitting/stepwise.h"
 #include "analysis/fitting/transition_model.h"
 #include "analysis/gap/collision_profile.h"
+#include "analysis/gap/facet_evidence.h"
 #include "analysis/gap/gap_cell.h"
 #include "analysis/gap/gap_shrinkage.h"
-#include "analysis/gap/left_over.h"
 #include "analysis/statistics/estimate.h"
 
 namespace metastable::analysis {
@@ -97,7 +97,7 @@ struct Unnamed {
 };
 
 /// Says what the data could have seen of one effect.
-struct Visibility {
+struct Detectability {
   std::string effect;
   std::string parameter;
   double smallest = 0;  ///< size seen with 2 Delta log likelihood 16 (found in most experiments like this one)
@@ -184,7 +184,7 @@ struct Diagnosis {
 
   /// Says what these data could not tell, and an experiment that would.
   struct Limits {
-    std::vector<Visibility> visible;
+    std::vector<Detectability> visible;
     std::vector<MissingColumn> missing;
     std::vector<NotPossible> not_possible;
     std::vector<NextExperiment> next;

@@ -5,7 +5,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "analysis/diagnosis/too_few.h"
+#include "analysis/diagnosis/not_possible.h"
 #include "analysis/statistics/number_text.h"
 
 namespace metastable::analysis {

@@ -5,7 +5,7 @@
 #include <vector>
 
 #include "analysis/fitting/cause_ranking.h"
-#include "analysis/gap/left_over.h"
+#include "analysis/gap/facet_evidence.h"
 #include "markov/dense_matrix.h"
 
 namespace metastable::analysis {

@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <map>
 
-#include "analysis/diagnosis/visibility.h"
+#include "analysis/diagnosis/detectability.h"
 
 namespace metastable::analysis {
 namespace {
@@ -13,8 +13,9 @@ constexpr double not_told = 0.9, well_told = 0.8;  // share of an effect's infor
 constexpr std::size_t most_stand_ins = 6;          // of an effect, to stand for all of its own
 
 // Returns every effect's visibility in data drawn from the model, by its id.
-std::map<std::string, Visibility> look(const TransitionModel& model, const std::vector<double>& nuisance,
-                                       const std::vector<const Candidate*>& wanted, const Rules& rules, int threads) {
+std::map<std::string, Detectability> look(const TransitionModel& model, const std::vector<double>& nuisance,
+                                          const std::vector<const Candidate*>& wanted, const Rules& rules,
+                                          int threads) {
   std::vector<Candidate> few;
   for (const Candidate& candidate : model.candidates()) {
     if (std::none_of(wanted.begin(), wanted.end(), [&](const Candidate* w) { return w->id == candidate.id; })) continue;
@@ -25,14 +26,14 @@ std::map<std::string, Visibility> look(const TransitionModel& model, const std::
   }
   std::vector<const Candidate*> candidates;
   for (const Candidate& candidate : few) candidates.push_back(&candidate);
-  std::map<std::string, Visibility> seen;
-  for (Visibility& v :
-       visibility(scan_effects(model, fit(model, nuisance, {}), candidates, threads), candidates, rules))
+  std::map<std::string, Detectability> seen;
+  for (Detectability& v :
+       detectability(scan_effects(model, fit(model, nuisance, {}), candidates, threads), candidates, rules))
     seen.emplace(v.effect, v);
   return seen;
 }
 
-double share_of(const Visibility& v, const std::string& other) {
+double share_of(const Detectability& v, const std::string& other) {
   for (const auto& [effect, share] : v.alike)
     if (effect == other) return share;
   return 0;

@@ -7,12 +7,12 @@
 #include <utility>
 
 #include "analysis/diagnosis/at_work.h"
+#include "analysis/diagnosis/not_possible.h"
 #include "analysis/diagnosis/parameter_estimates.h"
-#include "analysis/diagnosis/too_few.h"
+#include "analysis/fitting/bayes_factor.h"
 #include "analysis/fitting/cause_ranking.h"
-#include "analysis/fitting/evidence.h"
+#include "analysis/gap/facet_evidence.h"
 #include "analysis/gap/gap_map.h"
-#include "analysis/gap/left_over.h"
 
 namespace metastable::analysis {
 namespace {
@@ -80,9 +80,9 @@ Odds weigh_unnamed(Unnamed& alone, std::vector<Joined>& joined, const std::vecto
 }
 
 // Says whether the design itself cannot tell two effects apart where the first of them gains that much.
-bool acts_alike(const std::vector<Visibility>& visible, const std::string& effect, const std::string& other,
+bool acts_alike(const std::vector<Detectability>& visible, const std::string& effect, const std::string& other,
                 double gain, const Rules& rules) {
-  const auto seen = std::ranges::find(visible, effect, &Visibility::effect);
+  const auto seen = std::ranges::find(visible, effect, &Detectability::effect);
   if (seen == visible.end()) return false;
   const auto share = std::ranges::find(seen->alike, other, &std::pair<std::string, double>::first);
   return share != seen->alike.end() && (1 - share->second) * gain < rules.told_apart;
@@ -91,7 +91,7 @@ bool acts_alike(const std::vector<Visibility>& visible, const std::string& effec
 // Lists what the design itself cannot tell from the first of the set. Of several effects one may be another one, with
 // what it gains beside the others.
 std::vector<std::string> alike_of(const std::vector<std::string>& set, const std::vector<Cause>& ranked,
-                                  const std::vector<Visibility>& visible, const Rules& rules) {
+                                  const std::vector<Detectability>& visible, const Rules& rules) {
   const Cause& first = ranked.front();
   // Returns the gain of a hypothesis of just these effects, in any order.
   const auto gain_of = [&](std::vector<std::string> effects) {
@@ -178,8 +178,8 @@ Chosen choose(const TransitionModel& model, const CauseRanking& ranking, const s
   for (Joined& one : joined) chosen.supposed.push_back(std::move(one.unnamed));
   const double tolerated = rules.square_error();
   const double beyond = chosen.left.largest_beyond(tolerated * gained.collisions, tolerated * gained.stances);
-  if (chosen.left.p_value < rules.left_over_level && beyond > rules.left_over_square)
-    chosen.unnamed.left = odds_of(0.5 * (beyond - rules.left_over_square));
+  if (chosen.left.p_value < rules.remaining_level && beyond > rules.remaining_square)
+    chosen.unnamed.left = odds_of(0.5 * (beyond - rules.remaining_square));
   if (best.together > rules.surely_bent)
     chosen.unnamed.alone = std::max(chosen.unnamed.alone, rules.certain_odds);
   else if (best.together > rules.most_together)
@@ -190,10 +190,10 @@ Chosen choose(const TransitionModel& model, const CauseRanking& ranking, const s
 bool leaves_gap_held_out(const Shrinkage& log_score, const Diagnosis::Data& data, double bent, double by_itself,
                          const Rules& rules) {
   const double left = log_score.with_effect - by_itself;
-  const double tolerated = rules.square_error() * rules.left_over_errors * bent * log_score.baseline;
-  if (left > rules.least_left_over + tolerated) return true;
+  const double tolerated = rules.square_error() * rules.remaining_errors * bent * log_score.baseline;
+  if (left > rules.least_remaining + tolerated) return true;
   return data.trials >= Rules::enough_trials && log_score.with_effect_least > tolerated + by_itself &&
-         left * static_cast<double>(data.collisions) > rules.least_left_in_all;
+         left * static_cast<double>(data.collisions) > rules.least_remaining_in_all;
 }
 
 double Probabilities::of_effects() const {
@@ -229,7 +229,7 @@ Probabilities share_probabilities(const TransitionModel& model, const CauseRanki
 }
 
 Named give_verdict(const Probabilities& probabilities, const Odds& unnamed, const Tested& tested,
-                   const std::vector<Visibility>& visible, const Diagnosis::Data& data,
+                   const std::vector<Detectability>& visible, const Diagnosis::Data& data,
                    const std::string& recalibration_id, const Rules& rules) {
   Named named;
   if (trials_to_explain(data)) {

@@ -91,7 +91,7 @@ struct Named {
 /// neither an effect nor a recalibration is named: where they have a gap it is unexplained.
 /// @param visible  Diagnosis::Limits::visible
 Named give_verdict(const Probabilities& probabilities, const Odds& unnamed, const Tested& tested,
-                   const std::vector<Visibility>& visible, const Diagnosis::Data& data,
+                   const std::vector<Detectability>& visible, const Diagnosis::Data& data,
                    const std::string& recalibration_id, const Rules& rules);
 
 /// Corrects the probabilities of a partly explained gap by what each effect gains beside the unnamed: an effect that

@@ -9,8 +9,9 @@ Setting stand_in_setting() {
   return setting;
 }
 
-std::vector<RealityCondition> stand_in_conditions(const Setting& base) {
-  std::vector<RealityCondition> conditions{{"fast-9.59", base, 51}, {"slow-9.59", base, 48}, {"fast-7.02", base, 50}};
+std::vector<LaboratoryCondition> stand_in_conditions(const Setting& base) {
+  std::vector<LaboratoryCondition> conditions{
+      {"fast-9.59", base, 51}, {"slow-9.59", base, 48}, {"fast-7.02", base, 50}};
   conditions[0].setting.slope_deg = conditions[1].setting.slope_deg = 9.59;
   conditions[2].setting.slope_deg = 7.02;
   conditions[0].setting.initial_speed = {5.83, 0.28};

@@ -5,7 +5,7 @@
 #include <vector>
 
 #include "analysis/experiment/experiment_folder.h"
-#include "analysis/experiment/reality.h"
+#include "analysis/experiment/laboratory_experiment.h"
 
 namespace metastable::analysis {
 
@@ -16,7 +16,7 @@ namespace metastable::analysis {
 Setting stand_in_setting();
 
 /// Returns the conditions of stand_in() with their numbers of trials, for the virtual laboratory.
-std::vector<RealityCondition> stand_in_conditions(const Setting& base);
+std::vector<LaboratoryCondition> stand_in_conditions(const Setting& base);
 
 /// Simulates the paper's conditions (Sec. III): "fast-9.59" 51 trials launched at N(5.83, 0.28^2) rad/s, "slow-9.59" 48
 /// at N(4.51, 0.36^2), "fast-7.02" 50 at N(7.35, 0.19^2); first 16 collisions each.

@@ -5,8 +5,8 @@
 #include <map>
 #include <utility>
 
+#include "analysis/fitting/bayes_factor.h"
 #include "analysis/fitting/effect_sets.h"
-#include "analysis/fitting/evidence.h"
 #include "markov/parallel.h"
 
 namespace metastable::analysis {

@@ -52,20 +52,20 @@ struct Rules {
   // What the best hypothesis leaves, before something without a name is supposed.
 
   /// P-value of the map that it leaves. Convention: 0.3 %, three standard deviations.
-  double left_over_level = 0.003;
+  double remaining_level = 0.003;
   /// Square of a cell's statistic beyond the model error. Derivation: one of 30 cells exceeds it
-  /// by chance in 0.3 % of experiments, as left_over_level has it.
-  double left_over_square = 15;
+  /// by chance in 0.3 % of experiments, as remaining_level has it.
+  double remaining_square = 15;
   /// Held-out gap that counts as one [nats a collision]. Convention: a twentieth of a nat is what a normal error of a
   /// third of its sd does.
-  double least_left_over = 0.05;
+  double least_remaining = 0.05;
   /// Or that no draw of the trials takes away [nats, all collisions]. Derivation: 2 Delta log likelihood of 12, 3.5
   /// standard deviations.
-  double least_left_in_all = 6;
+  double least_remaining_in_all = 6;
   /// Squared model errors of the gap as given that count as none held out. Derivation: an error of form of e leaves e^2
   /// of an effect's gain, and one in each of about six of the aspects and facets that it shows in.
-  double left_over_errors = 6;
-  /// Squared model errors that may be spread over the cells of a facet. Derivation: as left_over_errors, of a facet's
+  double remaining_errors = 6;
+  /// Squared model errors that may be spread over the cells of a facet. Derivation: as remaining_errors, of a facet's
   /// three aspects: mean, spread, tail.
   double facet_errors = 3;
 
@@ -137,11 +137,11 @@ inline constexpr std::array named_rules{
     std::pair{"share_for_variations", &Rules::share_for_variations},
     std::pair{"share_for_cells", &Rules::share_for_cells},
     std::pair{"share_for_pairs", &Rules::share_for_pairs},
-    std::pair{"left_over_level", &Rules::left_over_level},
-    std::pair{"left_over_square", &Rules::left_over_square},
-    std::pair{"least_left_over", &Rules::least_left_over},
-    std::pair{"least_left_in_all", &Rules::least_left_in_all},
-    std::pair{"left_over_errors", &Rules::left_over_errors},
+    std::pair{"remaining_level", &Rules::remaining_level},
+    std::pair{"remaining_square", &Rules::remaining_square},
+    std::pair{"least_remaining", &Rules::least_remaining},
+    std::pair{"least_remaining_in_all", &Rules::least_remaining_in_all},
+    std::pair{"remaining_errors", &Rules::remaining_errors},
     std::pair{"facet_errors", &Rules::facet_errors},
     std::pair{"unnamed_alone", &Rules::unnamed_alone},
     std::pair{"unnamed_beside", &Rules::unnamed_beside},

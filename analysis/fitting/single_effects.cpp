@@ -5,7 +5,7 @@
 #include <limits>
 #include <utility>
 
-#include "analysis/fitting/evidence.h"
+#include "analysis/fitting/bayes_factor.h"
 #include "dynamics/numerics/truncated_normal.h"
 #include "markov/parallel.h"
 

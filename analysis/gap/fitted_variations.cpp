@@ -4,9 +4,9 @@
 #include <boost/math/distributions/chi_squared.hpp>
 #include <mutex>
 
+#include "analysis/fitting/bayes_factor.h"
 #include "analysis/fitting/effect_fit.h"
 #include "analysis/fitting/effect_scan.h"
-#include "analysis/fitting/evidence.h"
 #include "markov/parallel.h"
 
 namespace metastable::analysis {

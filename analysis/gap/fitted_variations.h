@@ -8,7 +8,7 @@
 #include "analysis/fitting/effect_scan.h"
 #include "analysis/fitting/model_fit.h"
 #include "analysis/fitting/rules.h"
-#include "analysis/gap/left_over.h"
+#include "analysis/gap/facet_evidence.h"
 
 namespace metastable::analysis {
 

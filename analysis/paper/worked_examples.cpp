@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <stdexcept>
 
-#include "analysis/experiment/reality.h"
+#include "analysis/experiment/laboratory_experiment.h"
 #include "analysis/experiment/stand_in.h"
 #include "analysis/paper/uncharged_sticking.h"
 #include "analysis/study/metastability.h"
@@ -13,10 +13,10 @@ namespace metastable::analysis {
 
 Experiment laboratory_stand_in(const std::vector<dynamics::Effect>& effects, std::uint64_t seed, int threads,
                                int trials) {
-  std::vector<RealityCondition> conditions = stand_in_conditions(stand_in_setting());
+  std::vector<LaboratoryCondition> conditions = stand_in_conditions(stand_in_setting());
   if (trials > 0)
-    for (RealityCondition& condition : conditions) condition.trials = trials;
-  RealityOptions options;
+    for (LaboratoryCondition& condition : conditions) condition.trials = trials;
+  LaboratoryOptions options;
   options.effects = effects;
   options.sensor_noise = 0.008;
   options.seed = seed;

@@ -138,8 +138,8 @@ double Chain::stay(std::size_t row) const {
 }
 
 Chain Chain::restricted_to(std::span<const std::uint32_t> states) const {
-  constexpr std::uint32_t kOutside = std::numeric_limits<std::uint32_t>::max();
-  std::vector<std::uint32_t> index(size(), kOutside);
+  constexpr std::uint32_t outside = std::numeric_limits<std::uint32_t>::max();
+  std::vector<std::uint32_t> index(size(), outside);
   for (std::size_t i = 0; i < states.size(); ++i) {
     if (states[i] >= size() || (i > 0 && states[i] <= states[i - 1])) {
       throw std::invalid_argument("restricted chain: states must ascend and lie below " + std::to_string(size()));
@@ -153,7 +153,7 @@ Chain Chain::restricted_to(std::span<const std::uint32_t> states) const {
     const auto to = columns(state);
     const auto probability = values(state);
     for (std::size_t e = 0; e < to.size(); ++e) {
-      if (index[to[e]] == kOutside) {
+      if (index[to[e]] == outside) {
         exits += probability[e];
       } else {
         part.column_.push_back(index[to[e]]);

@@ -14,10 +14,10 @@ namespace metastable::markov::dense {
 namespace {
 
 /// So few pivots are no longer halved.
-constexpr std::size_t kFewPivots = 16;
+constexpr std::size_t few_pivots = 16;
 
-/// Returns where `pivots` are halved: at a multiple of kFewPivots.
-std::size_t half(std::size_t pivots) { return (pivots / 2 + kFewPivots - 1) / kFewPivots * kFewPivots; }
+/// Returns where `pivots` are halved: at a multiple of few_pivots.
+std::size_t half(std::size_t pivots) { return (pivots / 2 + few_pivots - 1) / few_pivots * few_pivots; }
 
 constexpr std::size_t tile_rows = 6;
 std::size_t tiles(std::size_t count, std::size_t size) { return (count + size - 1) / size; }
@@ -108,7 +108,7 @@ METASTABLE_WIDEST void visit_few_pivots(Part visits, std::size_t count, Part squ
                                         std::size_t pivots) {
   // It takes rows side by side, transposed: the recursion runs down the pivots of each.
   constexpr std::size_t lanes = 8;
-  double lane[kFewPivots][lanes] = {};
+  double lane[few_pivots][lanes] = {};
   for (std::size_t first = 0; first < count; first += lanes) {
     const std::size_t used = std::min(lanes, count - first);
     for (std::size_t r = 0; r < used; ++r)
@@ -126,7 +126,7 @@ METASTABLE_WIDEST void visit_few_pivots(Part visits, std::size_t count, Part squ
 // Does what eliminate_square does, with `left` columns before the pivots' own.
 void eliminate_pivots(Part rows, std::size_t left, double* exit, std::size_t pivots) {
   const Part own = rows.from(0, left);
-  if (pivots > kFewPivots) {
+  if (pivots > few_pivots) {
     const std::size_t upper = half(pivots), lower = pivots - upper;
     const Part last = rows.from(upper, 0);
     eliminate_pivots(last, left + upper, exit + upper, lower);
@@ -135,7 +135,7 @@ void eliminate_pivots(Part rows, std::size_t left, double* exit, std::size_t piv
     eliminate_pivots(rows, left, exit, upper);
     return;
   }
-  double beyond[kFewPivots];
+  double beyond[few_pivots];
   for (std::size_t i = 0; i < pivots; ++i) beyond[i] = std::accumulate(rows.row(i), rows.row(i) + left, 0.0);
   for (std::size_t n = pivots; n-- > 0;) {
     exit[n] = std::accumulate(own.row(n), own.row(n) + n, beyond[n]);
@@ -154,7 +154,7 @@ void eliminate_pivots(Part rows, std::size_t left, double* exit, std::size_t piv
 void eliminate_square(Part square, double* exit, std::size_t pivots) { eliminate_pivots(square, 1, exit, pivots); }
 
 void eliminate_columns(Part rows, Part factor, std::size_t pivots, std::size_t count) {
-  if (pivots <= kFewPivots) return eliminate_few_columns(rows, factor, pivots, count);
+  if (pivots <= few_pivots) return eliminate_few_columns(rows, factor, pivots, count);
   const std::size_t upper = half(pivots), lower = pivots - upper;
   const Part last = rows.from(upper, 0);
   eliminate_columns(last, factor.from(upper, upper), lower, count);
@@ -163,7 +163,7 @@ void eliminate_columns(Part rows, Part factor, std::size_t pivots, std::size_t c
 }
 
 void visit_pivots(Part visits, std::size_t count, Part square, const double* exit, std::size_t pivots) {
-  if (pivots <= kFewPivots) return visit_few_pivots(visits, count, square, exit, pivots);
+  if (pivots <= few_pivots) return visit_few_pivots(visits, count, square, exit, pivots);
   const std::size_t upper = half(pivots), lower = pivots - upper;
   const Part last = visits.from(0, upper);
   visit_pivots(last, count, square.from(upper, upper), exit + upper, lower);

@@ -21,12 +21,12 @@ namespace {
 
 using Complex = std::complex<double>;
 
-constexpr double kShift = 1.05;
-constexpr double kTolerance = 1e-13;
-constexpr double kWorstResidual = 1e-8;
-constexpr double kSameValue = 1e-10;
-constexpr int kDenseSize = 16;
-constexpr int kIterations = 2000;
+constexpr double shift = 1.05;
+constexpr double tolerance = 1e-13;
+constexpr double worst_residual = 1e-8;
+constexpr double same_value = 1e-10;
+constexpr int dense_size = 16;
+constexpr int iteration_limit = 2000;
 
 struct RawPairs {
   Eigen::VectorXcd values;
@@ -37,7 +37,7 @@ struct RawPairs {
 class TransposedShiftInvert {
  public:
   using Scalar = double;
-  explicit TransposedShiftInvert(const Chain& chain) : size_(chain.size()), solver_(chain, kShift) {}
+  explicit TransposedShiftInvert(const Chain& chain) : size_(chain.size()), solver_(chain, shift) {}
   Eigen::Index rows() const { return static_cast<Eigen::Index>(size_); }
   Eigen::Index cols() const { return rows(); }
   void set_shift(double) {}  // fixed at construction
@@ -69,9 +69,9 @@ RawPairs arnoldi_pairs(const Chain& chain, int count) {
   TransposedShiftInvert inverse(chain);
   int subspace = std::min(n, std::max(2 * count + 1, 24));
   for (;; subspace = std::min(n, 3 * subspace)) {
-    Spectra::GenEigsRealShiftSolver<TransposedShiftInvert> solver(inverse, count, subspace, kShift);
+    Spectra::GenEigsRealShiftSolver<TransposedShiftInvert> solver(inverse, count, subspace, shift);
     solver.init();
-    const auto converged = solver.compute(Spectra::SortRule::LargestMagn, kIterations, kTolerance);
+    const auto converged = solver.compute(Spectra::SortRule::LargestMagn, iteration_limit, tolerance);
     if (solver.info() == Spectra::CompInfo::Successful) return {solver.eigenvalues(), solver.eigenvectors()};
     if (subspace == n || subspace >= 200) {
       throw ConvergenceError("Spectra", 1,
@@ -94,7 +94,7 @@ std::vector<Complex> sorted_values(const Eigen::VectorXcd& values, Eigen::Index 
     if (i == leading) continue;
     others.push_back(values[i]);
     const Complex partner = std::conj(values[i]);
-    const bool complete = (values.array() - partner).abs().minCoeff() <= kSameValue * std::abs(partner);
+    const bool complete = (values.array() - partner).abs().minCoeff() <= same_value * std::abs(partner);
     if (partner.imag() != 0 && !complete) others.push_back(partner);
   }
   std::sort(others.begin(), others.end(), [](Complex a, Complex b) {
@@ -123,7 +123,7 @@ std::vector<double> leading_vector(const Eigen::VectorXcd& vector, bool any_sign
 Eigenpairs leading_eigenpairs(const Chain& chain, int count) {
   const auto n = static_cast<int>(chain.size());
   if (n == 0 || count < 1) throw std::invalid_argument("eigenpairs: at least one state and one eigenvalue expected");
-  const RawPairs raw = n < kDenseSize || count > n - 2 ? dense_pairs(chain) : arnoldi_pairs(chain, count);
+  const RawPairs raw = n < dense_size || count > n - 2 ? dense_pairs(chain) : arnoldi_pairs(chain, count);
   const Eigen::Index leading = leading_index(raw.values);
 
   Eigenpairs pairs;
@@ -135,7 +135,7 @@ Eigenpairs leading_eigenpairs(const Chain& chain, int count) {
   for (std::size_t i = 0; i < image.size(); ++i) {
     pairs.residual = std::max(pairs.residual, std::abs(image[i] - pairs.values[0].real() * pairs.left[i]));
   }
-  if (!(pairs.residual <= kWorstResidual)) {
+  if (!(pairs.residual <= worst_residual)) {
     throw ConvergenceError("Spectra", pairs.residual, "the left eigenvector of lambda_1 is not one");
   }
   return pairs;

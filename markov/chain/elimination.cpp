@@ -20,12 +20,12 @@ using Vector = Eigen::Map<Eigen::VectorXd>;
 using ConstVector = Eigen::Map<const Eigen::VectorXd>;
 
 /// So many pivots are eliminated together from a full matrix.
-constexpr std::size_t kBlock = 128;
+constexpr std::size_t block_size = 128;
 /// Below this size, or below this fill of the square, the row-by-row elimination is used.
-constexpr std::size_t kBlockedSize = kBlock;
-constexpr double kBlockedFill = 0.6;
+constexpr std::size_t blocked_size = block_size;
+constexpr double blocked_fill = 0.6;
 /// So many columns, or rows, of a full matrix one thread takes at a time.
-constexpr std::size_t kColumnShare = 16 * dense::tile_columns, kRowShare = 96;
+constexpr std::size_t column_share = 16 * dense::tile_columns, row_share = 96;
 std::size_t shares(std::size_t count, std::size_t share) { return (count + share - 1) / share; }
 
 /// Does row += weight * source over columns [from, to).
@@ -104,7 +104,7 @@ std::size_t Elimination::Factors::find_envelope(const Chain& chain) {
 Elimination::Factors::Factors(const Chain& chain, int threads) : kill(chain.kill().begin(), chain.kill().end()) {
   const std::size_t n = chain.size();
   std::size_t total = find_envelope(chain);
-  const bool blocked = n >= kBlockedSize && static_cast<double>(total) > kBlockedFill * static_cast<double>(n * n);
+  const bool blocked = n >= blocked_size && static_cast<double>(total) > blocked_fill * static_cast<double>(n * n);
   if (blocked) {
     total = n * n;
     std::fill(low.begin(), low.end(), 0);
@@ -172,20 +172,20 @@ void Elimination::Factors::eliminate_square(std::size_t first, std::size_t last)
 /// of the rows above to the block, and all that these visits lead to as one matrix product.
 void Elimination::Factors::eliminate_blocks(int threads) {
   const std::size_t n = size();
-  std::vector<dense::TileRow> onward(shares(n, dense::tile_columns) * kBlock);
+  std::vector<dense::TileRow> onward(shares(n, dense::tile_columns) * block_size);
   for (std::size_t last = n; last > 0;) {
-    const std::size_t first = last > kBlock ? last - kBlock : 0, pivots = last - first;
+    const std::size_t first = last > block_size ? last - block_size : 0, pivots = last - first;
     eliminate_square(first, last);
     const dense::Part square{row(first) + first, n};
     dense::eliminate_columns({kill.data() + first, 1}, square, pivots, 1);
-    parallel_for(shares(first, kColumnShare), threads, [&](std::size_t share) {
-      const std::size_t from = share * kColumnShare, columns = std::min(kColumnShare, first - from);
+    parallel_for(shares(first, column_share), threads, [&](std::size_t share) {
+      const std::size_t from = share * column_share, columns = std::min(column_share, first - from);
       const dense::Part rows{row(first) + from, n};
       dense::eliminate_columns(rows, square, pivots, columns);
       dense::pack(rows, pivots, columns, onward.data() + from / dense::tile_columns * pivots);
     });
-    parallel_for(shares(first, kRowShare), threads, [&](std::size_t share) {
-      const std::size_t from = share * kRowShare, rows = std::min(kRowShare, first - from);
+    parallel_for(shares(first, row_share), threads, [&](std::size_t share) {
+      const std::size_t from = share * row_share, rows = std::min(row_share, first - from);
       const dense::Part visits{row(from) + first, n};
       dense::visit_pivots(visits, rows, square, exit.data() + first, pivots);
       for (std::size_t i = from; i < from + rows; ++i) kill[i] += dot(row(i), kill.data(), first, last);

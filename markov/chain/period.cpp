@@ -6,7 +6,7 @@
 namespace metastable::markov {
 namespace {
 
-constexpr double kStays = 1e-12;
+constexpr double stays = 1e-12;
 
 /// Finds breadth-first levels of the chain as an undirected graph: one up along a transition, one down against it.
 std::vector<std::int64_t> levels(const Chain& chain) {
@@ -41,7 +41,7 @@ Period find_period(const Chain& chain) {
   const std::vector<std::int64_t> level = levels(chain);
   std::int64_t divisor = 0;
   for (std::size_t i = 0; i < n && divisor != 1; ++i) {
-    if (chain.stay(i) > kStays) divisor = 1;
+    if (chain.stay(i) > stays) divisor = 1;
     for (const std::uint32_t j : chain.columns(i)) divisor = std::gcd(divisor, std::abs(level[i] + 1 - level[j]));
   }
   Period period;

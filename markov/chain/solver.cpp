@@ -14,8 +14,8 @@ using Dense = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMa
 using Sparse = Eigen::SparseMatrix<double, Eigen::RowMajor, std::int64_t>;
 using States = std::vector<std::uint32_t>;
 
-constexpr double kSparseFill = 0.1;
-constexpr double kRowExcess = 1e-9;
+constexpr double sparse_fill = 0.1;
+constexpr double row_excess = 1e-9;
 
 void check_size(const Chain& chain, std::span<const double> vector) {
   if (vector.size() != chain.size()) {
@@ -142,7 +142,7 @@ Chain revolution_chain(const Chain& chain, const Period& period) {
     value.push_back(probability);
   };
   const std::size_t states = period.classes[0].size();
-  if (largest_fill(chain, period) < kSparseFill) {
+  if (largest_fill(chain, period) < sparse_fill) {
     const Sparse product = revolution_product<Sparse>(chain, period);
     for (std::size_t i = 0; i < states; ++i) {
       for (Sparse::InnerIterator entry(product, static_cast<Eigen::Index>(i)); entry; ++entry) {
@@ -160,7 +160,7 @@ Chain revolution_chain(const Chain& chain, const Period& period) {
   if (chain.interpolated())
     return Chain::interpolated(std::move(start), std::move(column), std::move(value), revolution_kill(chain, period));
   return Chain(std::move(start), std::move(column), std::move(value), revolution_kill(chain, period),
-               kRowExcess * period.period);
+               row_excess * period.period);
 }
 
 ChainSolver::ChainSolver(const Chain& chain, int threads)

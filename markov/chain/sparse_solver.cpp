@@ -64,8 +64,8 @@ SparseSolver::Factors::Factors(const Chain& chain, double sigma) : size(static_c
   symbolic = klu_l_analyze(size, start.data(), index.data(), &common);
   if (symbolic) numeric = klu_l_factor(start.data(), index.data(), value.data(), symbolic, &common);
   if (numeric) klu_l_rcond(symbolic, numeric, &common);
-  constexpr double kEpsilon = std::numeric_limits<double>::epsilon();
-  if (!numeric || common.status != KLU_OK || !(common.rcond >= kEpsilon)) {
+  constexpr double machine_epsilon = std::numeric_limits<double>::epsilon();
+  if (!numeric || common.status != KLU_OK || !(common.rcond >= machine_epsilon)) {
     const double residual = numeric ? common.rcond : 0.0;
     const std::string detail = "status " + std::to_string(common.status) + ", the matrix is numerically singular";
     klu_l_free_numeric(&numeric, &common);

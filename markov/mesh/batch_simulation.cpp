@@ -16,8 +16,8 @@
 namespace metastable::markov {
 namespace {
 
-constexpr std::size_t kTogether = 128;  // trials followed side by side
-constexpr std::uint64_t kStream = 0x2000;
+constexpr std::size_t trials_together = 128;  // trials followed side by side
+constexpr std::uint64_t stream = 0x2000;
 
 /// Follows trials first .. first + count - 1 to their failures, `longest` steps at most; stops early once `spent`
 /// exceeds the limit of all.
@@ -40,14 +40,13 @@ void follow(const BatchMap& map, std::span<const double> start, const Simulation
       scores.resize(trial.size() * s);
       for (std::size_t i = 0; i < trial.size(); ++i)
         for (std::size_t k = 0; k < s; k += 4) {
-          const auto u = uniforms(options.seed, kStream + k / 4, trial[i], number);
+          const auto u = uniforms(options.seed, stream + k / 4, trial[i], number);
           for (std::size_t j = k; j < std::min(s, k + 4); ++j) scores[i * s + j] = normal_score(u[j - k]);
         }
       checked_step(map, phase, states, scores, next, failed);
     } else {
       words.resize(trial.size());
-      for (std::size_t i = 0; i < trial.size(); ++i)
-        words[i] = random_words(options.seed, kStream, trial[i], number)[0];
+      for (std::size_t i = 0; i < trial.size(); ++i) words[i] = random_words(options.seed, stream, trial[i], number)[0];
       checked_draw(map, phase, states, words, next, failed);
     }
     if ((spent += trial.size()) > options.most_steps) return;
@@ -73,7 +72,7 @@ bool follow_all(const BatchMap& map, std::span<const double> start, std::uint64_
     throw std::invalid_argument(fmt::format("simulation: {} trials, 2 or more expected", options.trials));
   steps.assign(options.trials, 0);
   std::atomic<std::uint64_t> spent = 0;
-  const std::size_t together = map.dear ? rows_of_a_dear_call : kTogether;
+  const std::size_t together = map.dear ? rows_of_a_dear_call : trials_together;
   parallel_for((options.trials + together - 1) / together, options.threads, [&](std::size_t share) {
     const std::size_t first = share * together, count = std::min(together, options.trials - first);
     if (spent <= options.most_steps)

@@ -14,19 +14,19 @@
 namespace metastable::markov {
 namespace {
 
-constexpr std::uint64_t kStates = 0x9000, kScores = 0xa000, kPlaces = 0xb000;
-constexpr std::size_t kLinesProbed = 3000, kOnALine = 16, kProbedTogether = 64;
-constexpr double kLeastReach = 6, kReach = 8.5;  // of a line [sds]: places of a curve hang on it
-constexpr double kOthersHeat = 2;                // of the scores but the first
-constexpr double kAboveNodes = 2;                // of one score: a line fails so much oftener than any node around,
-constexpr double kLineFails = 0.3, kNodesFail = 0.03;  // of several: more than the first where no node does the second,
-                                                       // nor the first under the line's other scores
-constexpr double kErrors = 2;                          // standard errors
-constexpr double kJumpWorth = 0.01;     // of the rate: a difference of failing between neighbours that is looked into,
-constexpr std::size_t kJumpEdges = 32;  // so many of them,
-constexpr int kJumpHalvings = 7;        // so often
-constexpr double kJumpsMatter = 0.05;   // of the rate, as a root of squares: jumps worth less show in the shifts alone
-constexpr double kJumpLeft = 0.3;       // of a difference: what is left of a jump, and 1/128 of what is smooth
+constexpr std::uint64_t states_stream = 0x9000, scores_stream = 0xa000, places_stream = 0xb000;
+constexpr std::size_t lines_probed = 3000, on_a_line = 16, probed_together = 64;
+constexpr double least_reach = 6, reach_in_sds = 8.5;  // of a line [sds]: places of a curve hang on it
+constexpr double others_heat = 2;                      // of the scores but the first
+constexpr double above_nodes = 2;  // of one score: a line fails so much oftener than any node around,
+constexpr double line_fails = 0.3, nodes_fail_share = 0.03;  // of several: more than the first where no node does the
+                                                             // second, nor the first under the line's other scores
+constexpr double tolerated_errors = 2;  // standard errors
+constexpr double jump_worth = 0.01;     // of the rate: a difference of failing between neighbours that is looked into,
+constexpr std::size_t jump_edges = 32;  // so many of them,
+constexpr int jump_halvings = 7;        // so often
+constexpr double jumps_matter = 0.05;   // of the rate, as a root of squares: jumps worth less show in the shifts alone
+constexpr double jump_left = 0.3;       // of a difference: what is left of a jump, and 1/128 of what is smooth
 
 /// Sums contributions of lines, each with its probability.
 struct Sum {
@@ -36,9 +36,9 @@ struct Sum {
     squares += x * x;
   }
   double bound() const {
-    const auto n = static_cast<double>(kLinesProbed);
+    const auto n = static_cast<double>(lines_probed);
     const double mean = sum / n;
-    return mean + kErrors * std::sqrt(std::max(0.0, squares / n - mean * mean) / n);
+    return mean + tolerated_errors * std::sqrt(std::max(0.0, squares / n - mean * mean) / n);
   }
 };
 
@@ -64,12 +64,12 @@ class Probing {
 
   BlindSpots find() {
     std::vector<std::vector<Line>> of_phase(static_cast<std::size_t>(map_.phases));
-    for (std::size_t n = 0; n < kLinesProbed; ++n) {
+    for (std::size_t n = 0; n < lines_probed; ++n) {
       Line line = draw(n);
       if (map_.inside && !map_.inside(line.phase, line.state)) continue;
       auto& waiting = of_phase[static_cast<std::size_t>(line.phase)];
       waiting.push_back(std::move(line));
-      if (waiting.size() == (map_.dear ? kLinesProbed : kProbedTogether)) probe(waiting);
+      if (waiting.size() == (map_.dear ? lines_probed : probed_together)) probe(waiting);
     }
     for (auto& waiting : of_phase)
       if (!waiting.empty()) probe(waiting);
@@ -100,7 +100,7 @@ class Probing {
   Line draw(std::size_t number) const {
     Line line;
     line.number = number;
-    const std::vector<double> u = numbers(kStates, number, 2 + 2 * d_);
+    const std::vector<double> u = numbers(states_stream, number, 2 + 2 * d_);
     const auto place = std::upper_bound(up_to_.begin(), up_to_.end(), u[0] * up_to_.back()) - up_to_.begin();
     const std::size_t node = std::min(static_cast<std::size_t>(place), mesh_.size() - 1);
     line.phase = mesh_.phase(node);
@@ -110,12 +110,12 @@ class Probing {
       const double by = options_.spacing * (u[2 + 2 * k] + u[3 + 2 * k] - 1);
       for (std::size_t i = 0; i < d_; ++i) line.state[i] += frame.axes[i * d_ + k] * by;
     }
-    line.reach = kLeastReach + (kReach - kLeastReach) * u[1];
+    line.reach = least_reach + (reach_in_sds - least_reach) * u[1];
     line.weight = visits_[node] / share_[node];
-    for (const double v : numbers(kScores, number, s_ - 1)) {
-      const double z = kOthersHeat * normal_score(v);
+    for (const double v : numbers(scores_stream, number, s_ - 1)) {
+      const double z = others_heat * normal_score(v);
       line.others.push_back(z);
-      line.weight *= kOthersHeat * std::exp(-0.5 * z * z * (1 - 1 / (kOthersHeat * kOthersHeat)));
+      line.weight *= others_heat * std::exp(-0.5 * z * z * (1 - 1 / (others_heat * others_heat)));
     }
     const Mesh::Corners corners = mesh_.corners(line.phase, line.state);
     if (static_cast<std::size_t>(corners.count) <= d_) return line;  // at the edge of the mesh
@@ -136,19 +136,19 @@ class Probing {
         follow_curves(map_, lattice_, lines.front().phase, along, options_.score_spacing, options_.spacing);
     std::vector<double> states, scores;
     for (const Line& line : lines) {
-      const std::vector<double> at = numbers(kPlaces, line.number, kOnALine);
-      for (std::size_t j = 0; j < kOnALine; ++j) {
+      const std::vector<double> at = numbers(places_stream, line.number, on_a_line);
+      for (std::size_t j = 0; j < on_a_line; ++j) {
         states.insert(states.end(), line.state.begin(), line.state.end());
-        scores.push_back(line.reach * (2 * (static_cast<double>(j) + at[j]) / kOnALine - 1));
+        scores.push_back(line.reach * (2 * (static_cast<double>(j) + at[j]) / on_a_line - 1));
         scores.insert(scores.end(), line.others.begin(), line.others.end());
       }
     }
     std::vector<double> next(states.size());
-    std::vector<std::uint8_t> failed(lines.size() * kOnALine, 0);
+    std::vector<std::uint8_t> failed(lines.size() * on_a_line, 0);
     checked_step(map_, lines.front().phase, states, scores, next, failed);
     for (std::size_t n = 0; n < lines.size(); ++n)
-      judge(lines[n], curves[n], std::span(scores).subspan(n * kOnALine * s_, kOnALine * s_),
-            std::span(failed).subspan(n * kOnALine, kOnALine));
+      judge(lines[n], curves[n], std::span(scores).subspan(n * on_a_line * s_, on_a_line * s_),
+            std::span(failed).subspan(n * on_a_line, on_a_line));
     found_.probes += failed.size();
     lines.clear();
   }
@@ -156,19 +156,19 @@ class Probing {
   void judge(const Line& line, const ScoreCurve& curve, std::span<const double> scores,
              std::span<const std::uint8_t> failed) {
     double missed = 0, imagined = 0;
-    for (std::size_t j = 0; j < kOnALine; ++j) {
+    for (std::size_t j = 0; j < on_a_line; ++j) {
       const double z = scores[j * s_];
       const auto fate = curve.fate(z);
       if (!fate || *fate == ScoreCurve::Fate::leaves || (*fate == ScoreCurve::Fate::fails) == (failed[j] != 0))
         continue;
       ++found_.hits;
       (failed[j] ? missed : imagined) +=
-          2 * line.reach / kOnALine * std::exp(-0.5 * z * z) / std::sqrt(2 * std::numbers::pi);
+          2 * line.reach / on_a_line * std::exp(-0.5 * z * z) / std::sqrt(2 * std::numbers::pi);
     }
     parts_.clear();
     const double fails = curve.share(lattice_, (line.phase + 1) % map_.phases, 1, parts_).fails;
-    const bool alone = s_ == 1 ? fails > kAboveNodes * line.nodes_fail
-                               : fails > kLineFails && line.nodes_fail < kNodesFail && !fails_around(line);
+    const bool alone = s_ == 1 ? fails > above_nodes * line.nodes_fail
+                               : fails > line_fails && line.nodes_fail < nodes_fail_share && !fails_around(line);
     if (alone) {
       ++found_.hits;
       missed += fails;
@@ -192,7 +192,7 @@ class Probing {
         follow_curves(map_, lattice_, line.phase, along, options_.score_spacing, options_.spacing);
     return std::any_of(curves.begin(), curves.end(), [&](const ScoreCurve& curve) {
       parts_.clear();
-      return curve.share(lattice_, (line.phase + 1) % map_.phases, 1, parts_).fails > kLineFails;
+      return curve.share(lattice_, (line.phase + 1) % map_.phases, 1, parts_).fails > line_fails;
     });
   }
 
@@ -236,11 +236,11 @@ std::vector<Edge> edges_worth_it(const Mesh& mesh, std::span<const double> visit
       if (j == NodeTable::none) continue;
       const double difference = std::abs(mesh.kill()[i] - mesh.kill()[j]);
       const double worth = difference * std::max(visits[i], visits[j]) / failing;
-      if (worth < kJumpWorth) continue;
+      if (worth < jump_worth) continue;
       edges.push_back({mesh.phase(i), mesh.state(i), mesh.state(j), mesh.kill()[i], mesh.kill()[j], worth});
     }
   std::stable_sort(edges.begin(), edges.end(), [](const Edge& a, const Edge& b) { return a.worth > b.worth; });
-  if (edges.size() > kJumpEdges) edges.resize(kJumpEdges);
+  if (edges.size() > jump_edges) edges.resize(jump_edges);
   return edges;
 }
 
@@ -313,11 +313,11 @@ bool failing_jumps(const BatchMap& map, const std::vector<NoiseFrame>& frames, c
     of_phase[static_cast<std::size_t>(edge.phase)].push_back(&edge);
   }
   for (std::vector<Edge*>& some : of_phase)
-    for (int halving = 0; halving < kJumpHalvings && !some.empty(); ++halving) halve(map, lattice, some, options);
+    for (int halving = 0; halving < jump_halvings && !some.empty(); ++halving) halve(map, lattice, some, options);
   double squares = 0;  // of what jumps are worth, each of them half a spacing off at random
   for (std::size_t e = 0; e < edges.size(); ++e)
-    if (edges[e].difference() > kJumpLeft * before[e]) squares += edges[e].worth * edges[e].worth;
-  return std::sqrt(squares) > kJumpsMatter;
+    if (edges[e].difference() > jump_left * before[e]) squares += edges[e].worth * edges[e].worth;
+  return std::sqrt(squares) > jumps_matter;
 }
 
 }  // namespace metastable::markov

@@ -11,15 +11,15 @@
 namespace metastable::markov {
 namespace {
 
-constexpr int kProducts = 20000;      // of all rounds together
-constexpr int kSmoothing = 20;        // products between two solutions of the small chain
-constexpr double kRoundStill = 1e-8;  // what a round may change of the expected steps
-constexpr double kBalanced = 1e-6;    // and of any class's visits, beyond what leaves it,
-constexpr int kStillRounds = 3;       // so many rounds running
-constexpr int kInverseRounds = 200;   // of the small chain's inverse iteration
-constexpr double kSettledRate = 1e-12;
-constexpr double kSettled = 1e-9;  // of survivors in the first gait: what their failures change by in a revolution,
-constexpr int kHead = 4000;        // followed for so many steps if they do not settle
+constexpr int product_limit = 20000;        // of all rounds together
+constexpr int smoothing = 20;               // products between two solutions of the small chain
+constexpr double round_still = 1e-8;        // what a round may change of the expected steps
+constexpr double balance_tolerance = 1e-6;  // and of any class's visits, beyond what leaves it,
+constexpr int still_rounds = 3;             // so many rounds running
+constexpr int inverse_rounds = 200;         // of the small chain's inverse iteration
+constexpr double settled_rate = 1e-12;
+constexpr double settled = 1e-9;  // of survivors in the first gait: what their failures change by in a revolution,
+constexpr int head = 4000;        // followed for so many steps if they do not settle
 
 /// Returns where each node's largest entry leads; itself where it has none.
 std::vector<std::uint32_t> likeliest_steps(const Mesh& mesh) {
@@ -90,8 +90,8 @@ class Aggregation {
   /// sum of them all.
   bool balanced(const std::vector<double>& visits) const {
     for (std::size_t c = 0; c < classes_; ++c)
-      if (mass_[c] > 0 &&
-          std::abs(visits[c] / mass_[c] - 1) > kBalanced + static_cast<double>(kSmoothing) * leave_[c] / mass_[c])
+      if (mass_[c] > 0 && std::abs(visits[c] / mass_[c] - 1) >
+                              balance_tolerance + static_cast<double>(smoothing) * leave_[c] / mass_[c])
         return false;
     return true;
   }
@@ -108,7 +108,7 @@ class Aggregation {
     const double all = std::accumulate(mass_.begin(), mass_.end(), 0.0);
     for (std::size_t c = 0; c < classes_; ++c) x[c] = mass_[c] / all;
     double rate = 0;
-    for (int round = 0; round < kInverseRounds; ++round) {
+    for (int round = 0; round < inverse_rounds; ++round) {
       std::vector<double> y = solve(x, false);
       const double sum = std::accumulate(y.begin(), y.end(), 0.0);
       double fails = 0;
@@ -116,7 +116,7 @@ class Aggregation {
         x[c] = y[c] / sum;
         if (mass_[c] > 0) fails += x[c] * kill_[c] / mass_[c];
       }
-      if (std::abs(fails - rate) <= kSettledRate * fails) return fails;
+      if (std::abs(fails - rate) <= settled_rate * fails) return fails;
       rate = fails;
     }
     return rate;
@@ -185,7 +185,7 @@ std::vector<std::uint32_t> gait_classes(const Mesh& mesh, const std::vector<std:
 
 CoupledPassage coupled_passage(const Mesh& mesh, std::span<const double> start, const std::vector<std::uint32_t>& gait,
                                std::size_t gaits) {
-  CoupledPassage found{.passage = mesh_passage(mesh, start, kSettled, kHead, true)};
+  CoupledPassage found{.passage = mesh_passage(mesh, start, settled, head, true)};
   MeshPassage& passage = found.passage;
   found.first_rate = passage.failure_rate;
   std::vector<double> b(mesh.size(), 0.0), led(mesh.size());
@@ -197,17 +197,17 @@ CoupledPassage coupled_passage(const Mesh& mesh, std::span<const double> start, 
   for (std::size_t i = 0; i < b.size(); ++i) start_by_class[aggregation.of(i)] += b[i];
   std::vector<double> y = passage.visits;
   double last = 0, change = 0;
-  for (int still = 0; still < kStillRounds;) {
-    if (passage.products >= kProducts)
+  for (int still = 0; still < still_rounds;) {
+    if (passage.products >= product_limit)
       throw ConvergenceError("mesh", change, "visits still change after 20000 products");
-    for (int k = 0; k < kSmoothing; ++k) smooth(mesh, b, y, led);
-    passage.products += kSmoothing;
+    for (int k = 0; k < smoothing; ++k) smooth(mesh, b, y, led);
+    passage.products += smoothing;
     aggregation.read(y);
     const std::vector<double> visits = aggregation.solve(start_by_class, false);
     aggregation.scale(y, visits);
     const double steps = std::accumulate(visits.begin(), visits.end(), 0.0);
     change = std::abs(steps - last) / steps;
-    still = change <= kRoundStill && aggregation.balanced(visits) ? still + 1 : 0;
+    still = change <= round_still && aggregation.balanced(visits) ? still + 1 : 0;
     last = steps;
   }
   const std::vector<double> lower = aggregation.solve(start_by_class, true);

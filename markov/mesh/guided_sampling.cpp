@@ -16,8 +16,8 @@
 namespace metastable::markov {
 namespace {
 
-constexpr std::uint64_t kBurnIn = 0x3000, kOffsets = 0x4000, kChoices = 0x5000;
-constexpr double kDefensive = 0.05;  // share of the guide's mean that every score gets
+constexpr std::uint64_t burn_in_stream = 0x3000, offsets_stream = 0x4000, choices_stream = 0x5000;
+constexpr double defensive = 0.05;  // share of the guide's mean that every score gets
 
 class Guided {
  public:
@@ -87,7 +87,7 @@ class Guided {
         walking.push_back(k);
         states.insert(states.end(), &state[k * d], &state[k * d] + d);
         for (std::size_t j = 0; j < s; ++j)
-          scores.push_back(normal_score(uniforms(options_.seed, kBurnIn + j, number(first, k),
+          scores.push_back(normal_score(uniforms(options_.seed, burn_in_stream + j, number(first, k),
                                                  attempt[k] * 0x10000 + static_cast<std::uint64_t>(step[k]))[0]));
       }
       if (walking.empty()) continue;
@@ -124,7 +124,7 @@ class Guided {
     std::vector<double> offset;
     const auto s = static_cast<std::size_t>(map_.scores);
     for (std::size_t k = 0; k < s; k += 4) {
-      const auto u = uniforms(options_.seed, kOffsets + k / 4, number, static_cast<std::uint64_t>(left));
+      const auto u = uniforms(options_.seed, offsets_stream + k / 4, number, static_cast<std::uint64_t>(left));
       offset.insert(offset.end(), u.begin(), u.begin() + static_cast<std::ptrdiff_t>(std::min<std::size_t>(4, s - k)));
     }
     return offset;
@@ -155,10 +155,10 @@ class Guided {
     if (!(mean > 0)) return 0;
     double total = 0;
     for (std::size_t i = 0; i < m; ++i) {
-      worth[i] = fan.failed[i] ? 0 : worth[i] + kDefensive * mean / all;
+      worth[i] = fan.failed[i] ? 0 : worth[i] + defensive * mean / all;
       total += fan.weight[i] * worth[i];
     }
-    double at = total * uniforms(options_.seed, kChoices, number, static_cast<std::uint64_t>(left))[0];
+    double at = total * uniforms(options_.seed, choices_stream, number, static_cast<std::uint64_t>(left))[0];
     std::size_t chosen = m;
     for (std::size_t i = 0; i < m && at >= 0; ++i) {
       if (worth[i] == 0) continue;

@@ -10,17 +10,17 @@
 namespace metastable::markov {
 namespace {
 
-constexpr double kBucket = 1;                             // of actions, expanded together
-constexpr double kWorthAgain = 0.05;                      // a row speaks again if its node's action falls by this
-constexpr double kFarther = 0.5;                          // scores looked at, beyond what the action allows
-constexpr std::size_t kBatch = 32;                        // nodes whose landings are asked for at once,
-constexpr std::size_t kLines = 1024;                      // fewer where that makes more curves;
-constexpr std::size_t kDearLines = 1024;                  // and curves at once where calls are dear: some 20 rows each
-constexpr std::uint32_t kTaken = MeshGrowth::no_row - 1;  // not a row yet
-constexpr std::uint64_t kStatesOfRows = 0xd000;
-constexpr double kIrrational[] = {0.7548776662466927, 0.5698402909980532, 0.4301597090019468};  // of a row's states
-constexpr std::size_t kApart = 31;  // a prime: lines of scores whose states follow one another
-constexpr std::size_t kFewestInChunk = std::size_t{1} << 16, kMostInChunk = std::size_t{1} << 23;
+constexpr double bucket = 1;                             // of actions, expanded together
+constexpr double worth_again = 0.05;                     // a row speaks again if its node's action falls by this
+constexpr double farther = 0.5;                          // scores looked at, beyond what the action allows
+constexpr std::size_t batch_size = 32;                   // nodes whose landings are asked for at once,
+constexpr std::size_t line_limit = 1024;                 // fewer where that makes more curves;
+constexpr std::size_t dear_lines = 1024;                 // and curves at once where calls are dear: some 20 rows each
+constexpr std::uint32_t taken = MeshGrowth::no_row - 1;  // not a row yet
+constexpr std::uint64_t states_of_rows = 0xd000;
+constexpr double irrational[] = {0.7548776662466927, 0.5698402909980532, 0.4301597090019468};  // of a row's states
+constexpr std::size_t probe_stride = 31;  // a prime: lines of scores whose states follow one another
+constexpr std::size_t fewest_in_chunk = std::size_t{1} << 16, most_in_chunk = std::size_t{1} << 23;
 constexpr double infinity = std::numeric_limits<double>::infinity();
 
 }  // namespace
@@ -117,12 +117,12 @@ void MeshGrowth::lower(std::uint32_t node, double to) {
   action_[node] = to;
   if (row_of_[node] != no_row) {
     Row& row = row_[row_of_[node]];
-    if (row.again || !(to < row.said - kWorthAgain)) return;
+    if (row.again || !(to < row.said - worth_again)) return;
     row.again = true;
     again_.push_back(row_of_[node]);
     return;
   }
-  const auto place = std::max(current_, static_cast<std::size_t>(to / kBucket));
+  const auto place = std::max(current_, static_cast<std::size_t>(to / bucket));
   if (place >= bucket_.size()) bucket_.resize(place + 1);
   bucket_[place].push_back(node);
 }
@@ -175,7 +175,7 @@ void MeshGrowth::store(std::uint32_t node, Parts& parts, double failed, double a
   }
   parts.resize(used);
   if (chunk_.empty() || chunk_.back().column.size() + used > chunk_.back().column.capacity()) {
-    const std::size_t size = std::max(used, std::clamp(entries_, kFewestInChunk, kMostInChunk));
+    const std::size_t size = std::max(used, std::clamp(entries_, fewest_in_chunk, most_in_chunk));
     chunk_.emplace_back();
     chunk_.back().column.reserve(size);
     chunk_.back().value.reserve(size);
@@ -214,11 +214,11 @@ std::vector<double> MeshGrowth::row_states(std::uint32_t node, std::size_t count
   states.clear();
   const std::size_t d = centre.size();
   const NoiseFrame& frame = lattice_.frame(NodeLattice::phase(key_[node]));
-  const auto offset = uniforms(options_.seed, kStatesOfRows, key_[node], options_.shift);
+  const auto offset = uniforms(options_.seed, states_of_rows, key_[node], options_.shift);
   for (std::size_t q = 0; q < count; ++q) {
     states.insert(states.end(), centre.begin(), centre.end());
     for (std::size_t k = 0; k < d; ++k) {
-      const double step = k == 0 ? 1 / static_cast<double>(count) : kIrrational[k - 1];
+      const double step = k == 0 ? 1 / static_cast<double>(count) : irrational[k - 1];
       double u = offset[k] + static_cast<double>(q) * step;
       u -= std::floor(u);
       const double by = options_.spacing * (u < 0.5 ? std::sqrt(2 * u) - 1 : 1 - std::sqrt(2 * (1 - u)));
@@ -232,7 +232,7 @@ std::vector<double> MeshGrowth::row_states(std::uint32_t node, std::size_t count
 /// its states, of several a lattice of the others, moved by an offset of the node's own. As far as the action allows.
 /// Returns the weight of the lines from states outside the section, which are left out: they count as failed.
 double MeshGrowth::add_lines(std::uint32_t node, Lines& lines) const {
-  const double far = std::min(options_.score_reach, kFarther + std::sqrt(2 * std::max(0.0, limit() - action_[node])));
+  const double far = std::min(options_.score_reach, farther + std::sqrt(2 * std::max(0.0, limit() - action_[node])));
   const auto d = static_cast<std::size_t>(map_.dimension);
   const int phase = NodeLattice::phase(key_[node]);
   double outside = 0;
@@ -264,13 +264,12 @@ double MeshGrowth::add_lines(std::uint32_t node, Lines& lines) const {
   const double sum = std::accumulate(weight.begin(), weight.end(), 0.0);
   const std::vector<double> states = row_states(node, m);
   // Neighbours on the lattice of scores come one after another, and so would their states.
-  const std::size_t apart = kApart % m == 0 ? 1 : kApart;
+  const std::size_t apart = probe_stride % m == 0 ? 1 : probe_stride;
   for (std::size_t i = 0; i < m; ++i) {
     const auto others = std::span(score).subspan(i * fixed, fixed);
     const double left = far * far - std::inner_product(others.begin(), others.end(), others.begin(), 0.0);
     if (left > 0)
-      add(std::span(states).subspan(i * apart % m * d, d), others, weight[i] / sum,
-          std::max(kFarther, std::sqrt(left)));
+      add(std::span(states).subspan(i * apart % m * d, d), others, weight[i] / sum, std::max(farther, std::sqrt(left)));
   }
   return outside;
 }
@@ -317,7 +316,7 @@ std::vector<std::uint32_t> MeshGrowth::take_wave() {
   wave.swap(bucket_[current_]);
   std::erase_if(wave, [&](std::uint32_t node) {  // it may have been landed, or come twice
     const bool fresh = row_of_[node] == no_row;
-    if (fresh) row_of_[node] = kTaken;
+    if (fresh) row_of_[node] = taken;
     return !fresh;
   });
   return wave;
@@ -327,7 +326,7 @@ void MeshGrowth::expand_wave(std::vector<std::uint32_t>& wave) {
   std::stable_sort(wave.begin(), wave.end(), [&](std::uint32_t a, std::uint32_t b) {
     return NodeLattice::phase(key_[a]) < NodeLattice::phase(key_[b]);
   });
-  const std::size_t lines = map_.dear ? kDearLines : kLines, batch = map_.dear ? kDearLines : kBatch;
+  const std::size_t lines = map_.dear ? dear_lines : line_limit, batch = map_.dear ? dear_lines : batch_size;
   const std::size_t each = others_ ? others_->size() : static_cast<std::size_t>(options_.row_states);
   const std::size_t together = each > 1 ? std::clamp<std::size_t>(lines / each, 1, batch) : batch;
   std::string broken;
@@ -350,7 +349,7 @@ void MeshGrowth::expand_wave(std::vector<std::uint32_t>& wave) {
 
 void MeshGrowth::grow() {
   while (static_cast<double>(current_) < largest(static_cast<double>(bucket_.size())) &&
-         static_cast<double>(current_) * kBucket <= limit()) {
+         static_cast<double>(current_) * bucket <= limit()) {
     std::vector<std::uint32_t> wave = take_wave();
     if (sum(static_cast<double>(wave.size())) == 0) {
       ++current_;

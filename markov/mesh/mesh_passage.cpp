@@ -10,8 +10,8 @@
 namespace metastable::markov {
 namespace {
 
-constexpr double kStill = 1e-6;  // distance between distributions a revolution apart
-constexpr int kInARow = 3;
+constexpr double still_distance = 1e-6;  // distance between distributions a revolution apart
+constexpr int in_a_row = 3;
 
 // The fate, in one revolution, of those alive at its beginning, as shares of them.
 struct Revolution {
@@ -92,7 +92,7 @@ MeshPassage follow_survivors(const MassRows& rows, std::vector<double> x, double
   const auto visit = [&](double times) {
     for (std::size_t i = 0; i < n; ++i) passage.visits[i] += times * turn.visits[i];
   };
-  while (settled < kInARow) {
+  while (settled < in_a_row) {
     if (passage.products >= most_products && !or_stop)
       throw ConvergenceError("mesh", last_failures,
                              "survivors still change after " + std::to_string(most_products) + " products");
@@ -110,11 +110,11 @@ MeshPassage follow_survivors(const MassRows& rows, std::vector<double> x, double
     }
     distances.push_back(total(rows, {distance_of(x, before), 0})[0]);
     const bool still =
-        std::abs(turn.failures - last_failures) <= settled_change * turn.failures && distances.back() <= kStill;
+        std::abs(turn.failures - last_failures) <= settled_change * turn.failures && distances.back() <= still_distance;
     settled = still ? settled + 1 : 0;
-    if (or_stop && passage.products >= most_products) settled = kInARow;
+    if (or_stop && passage.products >= most_products) settled = in_a_row;
     last_failures = turn.failures;
-    if (settled == kInARow) {
+    if (settled == in_a_row) {
       passage.steps_upper = passage.steps + alive * turn.steps / turn.failures;
       passage.steps_lower = steps_lower + alive_lower * turn.steps_lower / turn.failures_lower;
       passage.steps = std::sqrt(passage.steps_upper * passage.steps_lower);

@@ -24,25 +24,26 @@
 namespace metastable::markov {
 namespace {
 
-constexpr double kDisagrees = 1.7;     // joint half-widths: 99.9 % of the normal
-constexpr double kSampledWindows = 3;  // of guided samples: within one, failures are still few
-constexpr int kLongestWindow = 200;    // of guided samples [steps]
-constexpr double kEven = 0.5;          // effective samples a sample: below, their own scatter tells too small an error
-constexpr double kSampledFrom = 100;   // expected steps above which guided samples settle before they fail
-constexpr double kWidest = 4;          // of the interval: its end over its beginning, beyond which it is no answer
-constexpr double kMostBlind = 0.1;     // of the failures, in blind spots: beyond, bands are stepped over
-constexpr double kLeast = 0.25;        // of what the extrapolation's last order moved: its error
-constexpr double kRows = 5e-4;         // what reading rows off curves may leave, about so much
-constexpr std::size_t kFewestTrials = 100;
-constexpr std::size_t kWalks = 512;      // counted where trials would be fewer,
-constexpr double kCounted = 0.5;         // with so much of the steps: an eighth of a quick study's time
-constexpr std::size_t kPilotShare = 16;  // trials for one of the pilot, which sees whether trials end,
-constexpr std::size_t kPilotLeast = 8, kPilotMost = 128;
-constexpr double kPilotSteps = 4;  // within so many times the expected steps: of 8, 8 or 7 do.
+constexpr double disagrees = 1.7;      // joint half-widths: 99.9 % of the normal
+constexpr double sampled_windows = 3;  // of guided samples: within one, failures are still few
+constexpr int longest_window = 200;    // of guided samples [steps]
+constexpr double least_even_share =
+    0.5;                              // effective samples a sample: below, their own scatter tells too small an error
+constexpr double sampled_from = 100;  // expected steps above which guided samples settle before they fail
+constexpr double widest = 4;          // of the interval: its end over its beginning, beyond which it is no answer
+constexpr double most_blind = 0.1;    // of the failures, in blind spots: beyond, bands are stepped over
+constexpr double least = 0.25;        // of what the extrapolation's last order moved: its error
+constexpr double row_error = 5e-4;    // what reading rows off curves may leave, about so much
+constexpr std::size_t fewest_trials = 100;
+constexpr std::size_t walk_count = 512;      // counted where trials would be fewer,
+constexpr double least_counted_share = 0.5;  // with so much of the steps: an eighth of a quick study's time
+constexpr std::size_t pilot_share = 16;      // trials for one of the pilot, which sees whether trials end,
+constexpr std::size_t pilot_least = 8, pilot_most = 128;
+constexpr double pilot_steps = 4;  // within so many times the expected steps: of 8, 8 or 7 do.
 // States of a row where the chance of failing jumps, by dimension: of 32 in one dimension shifts differ by 4 per cent.
-constexpr std::array<int, 4> kRowStates{256, 32, 16, 16};
-constexpr double kMemorySideBySide = 0.5;  // of all: for the meshes of a dear map that grow side by side
-constexpr double kLongestTrial = 30;       // times the expected steps: one trial of 1e13 takes longer
+constexpr std::array<int, 4> row_states_by_dimension{256, 32, 16, 16};
+constexpr double memory_side_by_side = 0.5;  // of all: for the meshes of a dear map that grow side by side
+constexpr double longest_trial_factor = 30;  // times the expected steps: one trial of 1e13 takes longer
 
 /// Returns the coarsest spacings that the extrapolation was found to bear, by dimension.
 double coarsest(int dimension) {
@@ -85,12 +86,12 @@ Extrapolated extrapolate(const std::vector<std::vector<double>>& logs, double sa
   // that order moved less than the ones before it. No more than to a quarter, and with four times what this says.
   const double before = std::abs(at_zero(mean, 1, sizes) - mean.back());
   e.discretization_error = std::abs(e.log_value - at_zero(mean, 1, sizes));
-  if (before > 0) e.discretization_error *= std::clamp(4 * e.discretization_error / before, kLeast, 1.0);
+  if (before > 0) e.discretization_error *= std::clamp(4 * e.discretization_error / before, least, 1.0);
   // Where a fourth size was asked for the square is far off; the error is what the extrapolation by three last moved.
   if (sizes > 3)
     e.discretization_error = std::max(e.discretization_error,
                                       std::abs(at_zero(mean, sizes - 3, sizes) - at_zero(mean, sizes - 4, sizes - 1)));
-  e.discretization_error = std::hypot(safety * e.discretization_error, kRows);
+  e.discretization_error = std::hypot(safety * e.discretization_error, row_error);
   return e;
 }
 
@@ -103,7 +104,7 @@ MeshEstimate around(double value, double relative) {
 /// Names two ways that disagree, or returns nothing.
 std::string disagreement(const char* one, const MeshEstimate& a, const char* other, const MeshEstimate& b) {
   const double apart = std::abs(std::log(a.value / b.value));
-  if (!(a.lower > 0 && b.lower > 0) || apart <= kDisagrees * std::hypot(half_width(a), half_width(b))) return {};
+  if (!(a.lower > 0 && b.lower > 0) || apart <= disagrees * std::hypot(half_width(a), half_width(b))) return {};
   return fmt::format(
       "{} ({:.4g} steps, {:.4g} to {:.4g}) and {} ({:.4g}, {:.4g} to {:.4g}) disagree: no number is given", one,
       a.value, a.lower, a.upper, other, b.value, b.lower, b.upper);
@@ -112,7 +113,7 @@ std::string disagreement(const char* one, const MeshEstimate& a, const char* oth
 /// Says what direct simulation finds where there is no mesh, and whether walks fail in it.
 std::pair<std::string, bool> walked_alone(const BatchMap& map, std::span<const double> start,
                                           const MeshStudyOptions& options) {
-  const std::size_t walks = std::clamp<std::size_t>(options.simulated_steps, 2, kWalks);
+  const std::size_t walks = std::clamp<std::size_t>(options.simulated_steps, 2, walk_count);
   const std::uint64_t longest = std::max<std::uint64_t>(1, options.simulated_steps / walks);
   std::vector<std::uint64_t> walked =
       follow_walks(map, start, longest, {.trials = walks, .seed = options.seed, .threads = options.threads});
@@ -169,15 +170,15 @@ class Run {
     else
       parallel_for(tasks, at_once_, [&](std::size_t task) { make(task, map_); });
     join();
-    over(kMeshes);
+    over(meshes_stage);
     foresee_other_ways(study_.steps.value, study_.mixing_steps);
-    if (study_.steps.upper > kWidest * study_.steps.lower)
+    if (study_.steps.upper > widest * study_.steps.lower)
       study_.disagreement =
           fmt::format("the meshes do not converge ({:.4g} steps, {:.4g} to {:.4g}){}: no number is given",
                       study_.steps.value, study_.steps.lower, study_.steps.upper,
                       options_.simulated_steps > 0 ? "; " + walked_alone(map_, start_, options_).first : std::string());
     if (study_.disagreement.empty()) simulate();
-    over(kSimulation);
+    over(simulation_stage);
     if (study_.disagreement.empty()) see_blind_spots();
     if (!study_.disagreement.empty()) return std::move(study_);
     sample();
@@ -228,7 +229,7 @@ class Run {
         return solve(with_all, 0, 0);
       }
     }
-    study_.row_states = kRowStates[static_cast<std::size_t>(map_.dimension - 1)];
+    study_.row_states = row_states_by_dimension[static_cast<std::size_t>(map_.dimension - 1)];
     spent();
     const Mesh averaged(map_, frames_, start_, mesh_options(0, 0));
     coarsest_ = spent();
@@ -256,17 +257,17 @@ class Run {
   /// Foresees the rows of both other ways. @param steps, mixing  as far as they are known
   void foresee_other_ways(double steps, double mixing) {
     const auto allowed = static_cast<double>(options_.simulated_steps), expected = std::max(1.0, steps);
-    const bool to_failure = allowed / expected >= static_cast<double>(kFewestTrials) && !several_gaits();
-    const double longest = kCounted * allowed / static_cast<double>(kWalks);
+    const bool to_failure = allowed / expected >= static_cast<double>(fewest_trials) && !several_gaits();
+    const double longest = least_counted_share * allowed / static_cast<double>(walk_count);
     const double simulated =
-        to_failure ? allowed : static_cast<double>(kWalks) * expected * -std::expm1(-longest / expected);
+        to_failure ? allowed : static_cast<double>(walk_count) * expected * -std::expm1(-longest / expected);
     const std::lock_guard lock(mutex_);
-    work_.replan(kSimulation, simulated);
+    work_.replan(simulation_stage, simulated);
     const int forgets = forgetting_steps(mixing);
-    const bool guided = options_.guided_samples > 0 && !several_gaits() && steps > kSampledFrom &&
-                        steps > kSampledWindows * std::min(forgets, kLongestWindow);
+    const bool guided = options_.guided_samples > 0 && !several_gaits() && steps > sampled_from &&
+                        steps > sampled_windows * std::min(forgets, longest_window);
     const double grown = map_.dear ? 0 : coarsest_.rows * mesh_work(1);
-    work_.replan(kGuided, guided ? grown + guided_rows(forgets, std::min(forgets, kLongestWindow)) : 0);
+    work_.replan(guided_stage, guided ? grown + guided_rows(forgets, std::min(forgets, longest_window)) : 0);
     tell();
   }
 
@@ -295,8 +296,8 @@ class Run {
     const double growth = std::pow(std::sqrt(2.0), static_cast<double>(sizes_ - 1));
     const double finest = coarse * std::pow(growth, map_.dimension + std::min(map_.scores, map_.dimension));
     if (map_.dear)
-      at_once_ = static_cast<int>(std::clamp(kMemorySideBySide * static_cast<double>(options_.most_bytes) / finest, 1.0,
-                                             static_cast<double>(sizes_ * shifts_ - 1)));
+      at_once_ = static_cast<int>(std::clamp(memory_side_by_side * static_cast<double>(options_.most_bytes) / finest,
+                                             1.0, static_cast<double>(sizes_ * shifts_ - 1)));
     study_.expected_bytes = finest * at_once_;
     if (study_.expected_bytes > static_cast<double>(options_.most_bytes))
       throw std::length_error(fmt::format(
@@ -362,7 +363,7 @@ class Run {
   /// Widens the intervals by what the mesh may not have seen, or says that it is too much.
   void see_blind_spots() {
     const BlindSpots& blind = study_.blind_spots;
-    if (blind.missed > kMostBlind || blind.imagined > kMostBlind)
+    if (blind.missed > most_blind || blind.imagined > most_blind)
       study_.disagreement = fmt::format(
           "the mesh ({:.4g} steps) and random steps ({} of {} at random places end otherwise than those around them, "
           "and "
@@ -401,13 +402,13 @@ class Run {
   }
 
   static std::uint64_t longest_trial(double expected) {
-    return static_cast<std::uint64_t>(std::max(1.0, std::ceil(kLongestTrial * expected)));
+    return static_cast<std::uint64_t>(std::max(1.0, std::ceil(longest_trial_factor * expected)));
   }
 
   /// Follows all trials of a dear map side by side without a pilot, whose calls would hold few rows; returns false if
   /// they take more steps than a pilot would allow.
   bool follow_in_time(std::size_t trials, double expected, std::vector<std::uint64_t>& steps) const {
-    const double most = kPilotSteps * expected * static_cast<double>(trials);
+    const double most = pilot_steps * expected * static_cast<double>(trials);
     const auto found = simulate_steps(map_, start_,
                                       {.trials = trials,
                                        .seed = options_.seed,
@@ -427,9 +428,9 @@ class Run {
       study_.no_simulated = "not asked for";
       return;
     }
-    if (trials < kFewestTrials || several_gaits()) {
-      const std::size_t walks = std::clamp<std::size_t>(options_.simulated_steps, 2, kWalks);
-      count(walks, std::floor(kCounted * allowed / static_cast<double>(walks)));
+    if (trials < fewest_trials || several_gaits()) {
+      const std::size_t walks = std::clamp<std::size_t>(options_.simulated_steps, 2, walk_count);
+      count(walks, std::floor(least_counted_share * allowed / static_cast<double>(walks)));
       study_.no_simulated =
           (several_gaits() ? "it would know one gait; " : "too few trials would fail; ") + count_text(*study_.walks);
       return;
@@ -437,7 +438,7 @@ class Run {
     std::vector<std::uint64_t> steps;
     const bool piloted = !map_.dear || !follow_in_time(trials, expected, steps);
     if (piloted) {
-      count(std::clamp(trials / kPilotShare, kPilotLeast, kPilotMost), kPilotSteps * expected);
+      count(std::clamp(trials / pilot_share, pilot_least, pilot_most), pilot_steps * expected);
       if (!study_.disagreement.empty()) return;
       steps = follow(trials, longest_trial(expected));
     }
@@ -453,7 +454,7 @@ class Run {
 
   void sample() {
     if (options_.guided_samples == 0) study_.no_guided = "not asked for";
-    if (options_.guided_samples > 0 && study_.steps.value <= kSampledFrom)
+    if (options_.guided_samples > 0 && study_.steps.value <= sampled_from)
       study_.no_guided = "not asked: failures are too frequent";
     if (several_gaits()) study_.no_guided = "its samples would know one gait";
     if (!study_.no_guided.empty()) return;
@@ -464,11 +465,12 @@ class Run {
     const int forgets = forgetting_steps(study_.mixing_steps);
     GuidedRate guided;
     double even = 0;
-    for (int window = std::min(forgets, kLongestWindow); even < kEven; window = std::min(2 * window, kLongestWindow)) {
-      if (study_.steps.value <= kSampledWindows * window) break;
+    for (int window = std::min(forgets, longest_window); even < least_even_share;
+         window = std::min(2 * window, longest_window)) {
+      if (study_.steps.value <= sampled_windows * window) break;
       if (guided.samples > 0) {
         const std::lock_guard lock(mutex_);
-        work_.add(kGuided, guided_rows(forgets, window));
+        work_.add(guided_stage, guided_rows(forgets, window));
       }
       guided = guided_failure_rate(map_, *guide_, start_,
                                    {.samples = options_.guided_samples,
@@ -477,13 +479,13 @@ class Run {
                                     .seed = options_.seed,
                                     .threads = options_.threads});
       even = guided.effective_samples / static_cast<double>(options_.guided_samples);
-      if (window == kLongestWindow) break;
+      if (window == longest_window) break;
     }
     study_.guided_samples = guided.samples;
     study_.no_guided =
         guided.samples > 0 ? "too few of its samples lead to failure to tell" : "not asked: failures are too frequent";
     if (!(guided.rate > 0)) return;
-    const double half = normal_95 * guided.standard_error / guided.rate * std::max(1.0, kEven / even);
+    const double half = normal_95 * guided.standard_error / guided.rate * std::max(1.0, least_even_share / even);
     if (!(half < 1)) return;                                                   // it tells nothing
     const double beyond = study_.steps.value - 1 / study_.failure_rate.value;  // what the start is worth
     const double sampled = 1 / guided.rate + beyond;
@@ -491,7 +493,7 @@ class Run {
     study_.no_guided.clear();
   }
 
-  static constexpr std::size_t kMeshes = 0, kSimulation = 1, kGuided = 2;  // stages of the work
+  static constexpr std::size_t meshes_stage = 0, simulation_stage = 1, guided_stage = 2;  // stages of the work
   struct Spent {
     double rows = 0, seconds = 0;
   };

@@ -7,15 +7,15 @@ namespace metastable::markov {
 namespace {
 
 // Keys have 15 bits an axis, phases above.
-constexpr int kBits = 15;
-constexpr std::int32_t kHalf = 1 << (kBits - 1);
-constexpr int kBlockBits = 3;
+constexpr int bits_of_an_axis = 15;
+constexpr std::int32_t half = 1 << (bits_of_an_axis - 1);
+constexpr int block_bits = 3;
 
 using Place = std::array<std::int32_t, 4>;
 
 std::uint64_t pack(int phase, const Place& place) {
   std::uint64_t key = static_cast<std::uint64_t>(phase);
-  for (const std::int32_t k : place) key = (key << kBits) | static_cast<std::uint64_t>(k + kHalf);
+  for (const std::int32_t k : place) key = (key << bits_of_an_axis) | static_cast<std::uint64_t>(k + half);
   return key;
 }
 
@@ -49,19 +49,20 @@ void NodeTable::insert(std::uint64_t key, std::uint32_t node) {
 NodeLattice::NodeLattice(std::vector<NoiseFrame> frames, double spacing, const Point& shift)
     : frames_(std::move(frames)), spacing_(spacing), shift_(shift) {}
 
-int NodeLattice::phase(std::uint64_t key) { return static_cast<int>(key >> (4 * kBits)); }
+int NodeLattice::phase(std::uint64_t key) { return static_cast<int>(key >> (4 * bits_of_an_axis)); }
 
 std::uint64_t NodeLattice::block(std::uint64_t key) {
-  constexpr std::uint64_t axis = (1U << kBlockBits) - 1;
-  constexpr std::uint64_t within = axis | axis << kBits | axis << (2 * kBits) | axis << (3 * kBits);
+  constexpr std::uint64_t axis = (1U << block_bits) - 1;
+  constexpr std::uint64_t within =
+      axis | axis << bits_of_an_axis | axis << (2 * bits_of_an_axis) | axis << (3 * bits_of_an_axis);
   return key & ~within;
 }
 
 std::vector<double> NodeLattice::state(std::uint64_t key) const {
   const NoiseFrame& of_phase = frame(phase(key));
   std::array<double, 4> at{};
-  for (std::size_t k = 4; k-- > 0; key >>= kBits)
-    at[k] = static_cast<std::int32_t>(key & ((1U << kBits) - 1)) - kHalf + shift_[k];
+  for (std::size_t k = 4; k-- > 0; key >>= bits_of_an_axis)
+    at[k] = static_cast<std::int32_t>(key & ((1U << bits_of_an_axis) - 1)) - half + shift_[k];
   const std::size_t d = dimension();
   std::vector<double> state = of_phase.centre;
   for (std::size_t i = 0; i < d; ++i)
@@ -77,12 +78,12 @@ bool NodeLattice::locate(int phase, const double* state, Point& point) const {
     double u = 0;
     for (std::size_t i = 0; i < d; ++i) u += of_phase.inverse[k * d + i] * (state[i] - of_phase.centre[i]);
     point[k] = u / spacing_ - shift_[k];
-    reachable = reachable && std::abs(point[k]) < kHalf - 2;
+    reachable = reachable && std::abs(point[k]) < half - 2;
   }
   return reachable;
 }
 
-std::uint64_t NodeLattice::axis_key(std::size_t k) { return std::uint64_t{1} << (kBits * (3 - k)); }
+std::uint64_t NodeLattice::axis_key(std::size_t k) { return std::uint64_t{1} << (bits_of_an_axis * (3 - k)); }
 
 std::uint64_t NodeLattice::find_cell(int phase, const Point& point, Point& fraction) const {
   Place at{};

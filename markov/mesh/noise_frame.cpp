@@ -16,10 +16,10 @@ using Eigen::Index;
 using Eigen::MatrixXd;
 using Eigen::VectorXd;
 
-constexpr int kRevolutions = 5000;
+constexpr int revolution_limit = 5000;
 constexpr double orbit_tolerance = 1e-11;
-constexpr double kJumps = 3;         // derivative over the change from -1 to 1 sd, beyond which the map jumps
-constexpr double kNarrowest = 0.05;  // of the widest axis: nodes there are no nearer
+constexpr double jump_ratio = 3;    // derivative over the change from -1 to 1 sd, beyond which the map jumps
+constexpr double narrowest = 0.05;  // of the widest axis: nodes there are no nearer
 
 /// Steps a map once. What is wrong with a failure there is said by `when`.
 class Probe {
@@ -44,7 +44,7 @@ class Probe {
 std::vector<VectorXd> settled_orbit(const BatchMap& map, const Probe& probe, std::span<const double> start) {
   const VectorXd quiet = VectorXd::Zero(map.scores);
   VectorXd state = Eigen::Map<const VectorXd>(start.data(), map.dimension);
-  for (int revolution = 0; revolution < kRevolutions; ++revolution) {
+  for (int revolution = 0; revolution < revolution_limit; ++revolution) {
     std::vector<VectorXd> orbit;
     VectorXd next = state;
     for (int phase = 0; phase < map.phases; ++phase) {
@@ -132,7 +132,7 @@ Derivatives derivatives(const BatchMap& map, int phase, const VectorXd& state) {
     if (!up || !down) continue;
     for (Index i = 0; i < d; ++i) {
       const double wide = ((*up)[i] - (*down)[i]) / 2;
-      if (wide != 0 && std::abs(found.by_scores(i, k)) > kJumps * std::abs(wide)) found.by_scores(i, k) = wide;
+      if (wide != 0 && std::abs(found.by_scores(i, k)) > jump_ratio * std::abs(wide)) found.by_scores(i, k) = wide;
     }
   }
   return found;
@@ -183,7 +183,7 @@ NoiseFreeOrbit noise_free_orbit(const BatchMap& map, std::span<const double> sta
         const MatrixXd correlation = sd.cwiseInverse().asDiagonal() * covariance * sd.cwiseInverse().asDiagonal();
         const SymmetricEigen eigen = symmetric_eigen(correlation);
         const VectorXd widths = eigen.values.reverse().cwiseMax(0).cwiseSqrt();
-        const VectorXd used = widths.cwiseMax(kNarrowest * widths[0]);
+        const VectorXd used = widths.cwiseMax(narrowest * widths[0]);
         const MatrixXd axes = sd.asDiagonal() * eigen.vectors.rowwise().reverse() * used.asDiagonal();
         frames[p].centre.assign(orbit[p].begin(), orbit[p].end());
         frames[p].axes = row_major(axes);

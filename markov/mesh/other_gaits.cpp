@@ -14,16 +14,16 @@
 namespace metastable::markov {
 namespace {
 
-constexpr std::uint64_t kHotStream = 0x8000;
-constexpr std::size_t kNodes = 1500;   // of the mesh, followed without noise
-constexpr std::size_t kHotWalks = 64;  // at each of
-constexpr double kHeats[] = {2, 4};    // so many times the noise: what has an action of 60 has one of 15 or 4 there
-constexpr int kHotSteps = 128, kKeptEvery = 8;
-constexpr double kHottest = 8;  // sds: no score is larger
-constexpr int kFirstRevolutions = 300, kMoreRevolutions = 2000, kOrbit = 32;
-constexpr double kNear = 1;       // stationary sds
-constexpr double kFarReach = 12;  // scores on meshes of several gaits, some of them left very rarely: 1e-32
-constexpr std::size_t kMostGaits = 8, kMostStrays = 64;
+constexpr std::uint64_t hot_stream = 0x8000;
+constexpr std::size_t nodes = 1500;    // of the mesh, followed without noise
+constexpr std::size_t hot_walks = 64;  // at each of
+constexpr double heats[] = {2, 4};     // so many times the noise: what has an action of 60 has one of 15 or 4 there
+constexpr int hot_steps = 128, kept_every = 8;
+constexpr double hottest = 8;  // sds: no score is larger
+constexpr int first_revolutions = 300, more_revolutions = 2000, orbit_length = 32;
+constexpr double near_distance = 1;  // stationary sds
+constexpr double far_reach = 12;     // scores on meshes of several gaits, some of them left very rarely: 1e-32
+constexpr std::size_t most_gaits = 8, most_strays = 64;
 
 using State = std::vector<double>;
 
@@ -38,7 +38,7 @@ class Search {
   /// Returns states of phase 0 that the noise can lead to.
   std::vector<State> seeds(std::span<const double> start, const Mesh& mesh, std::uint64_t seed) const {
     std::vector<State> found;
-    const std::size_t every = std::max<std::size_t>(1, mesh.size() / kNodes);
+    const std::size_t every = std::max<std::size_t>(1, mesh.size() / nodes);
     for (std::size_t i = 0; i < mesh.size(); i += every) {
       if (mesh.phase(i) != 0) continue;
       State state = mesh.state(i);
@@ -62,7 +62,8 @@ class Search {
 
   bool known(const State& state, const std::vector<std::vector<State>>& gaits) const {
     return std::any_of(gaits.begin(), gaits.end(), [&](const std::vector<State>& orbit) {
-      return std::any_of(orbit.begin(), orbit.end(), [&](const State& at) { return distance(state, at) < kNear; });
+      return std::any_of(orbit.begin(), orbit.end(),
+                         [&](const State& at) { return distance(state, at) < near_distance; });
     });
   }
 
@@ -70,8 +71,9 @@ class Search {
   void thin(std::vector<State>& states) const {
     std::vector<State> kept;
     for (State& state : states) {
-      if (kept.size() == kMostStrays) break;
-      if (std::none_of(kept.begin(), kept.end(), [&](const State& k) { return distance(state, k) < kNear / 2; }))
+      if (kept.size() == most_strays) break;
+      if (std::none_of(kept.begin(), kept.end(),
+                       [&](const State& k) { return distance(state, k) < near_distance / 2; }))
         kept.push_back(std::move(state));
     }
     states = std::move(kept);
@@ -79,7 +81,7 @@ class Search {
 
   std::vector<State> orbit(const State& state) const {
     std::vector<State> all{state}, at{state};
-    for (int r = 1; r < kOrbit; ++r) {
+    for (int r = 1; r < orbit_length; ++r) {
       relax(at, 1, {});
       if (at.empty() || distance(at.front(), state) < 1e-3) break;
       all.push_back(at.front());
@@ -128,20 +130,20 @@ class Search {
   /// Adds what the walks come through, those of the least heat first; all walk side by side.
   void walk_hot(std::span<const double> start, std::uint64_t seed, std::vector<State>& found) const {
     const State first(start.begin(), start.end());
-    std::vector<State> states(std::size(kHeats) * kHotWalks, first), met[std::size(kHeats)];
+    std::vector<State> states(std::size(heats) * hot_walks, first), met[std::size(heats)];
     std::vector<double> scores(states.size() * s_);
-    for (int number = 0; number < kHotSteps;) {
+    for (int number = 0; number < hot_steps;) {
       for (int phase = 0; phase < map_.phases; ++phase, ++number) {
         for (std::size_t i = 0; i < states.size(); ++i)
           for (std::size_t k = 0; k < s_; ++k) {
-            const std::size_t heat = i / kHotWalks, walk = i % kHotWalks;
-            const double u = uniforms(seed, kHotStream + heat, walk * s_ + k, static_cast<std::uint64_t>(number))[0];
-            scores[i * s_ + k] = std::clamp(kHeats[heat] * normal_score(u), -kHottest, kHottest);
+            const std::size_t heat = i / hot_walks, walk = i % hot_walks;
+            const double u = uniforms(seed, hot_stream + heat, walk * s_ + k, static_cast<std::uint64_t>(number))[0];
+            scores[i * s_ + k] = std::clamp(heats[heat] * normal_score(u), -hottest, hottest);
           }
         step(phase, states, scores);
       }
       for (std::size_t i = 0; i < states.size(); ++i) {
-        if (!states[i].empty() && number / map_.phases % kKeptEvery == 0) met[i / kHotWalks].push_back(states[i]);
+        if (!states[i].empty() && number / map_.phases % kept_every == 0) met[i / hot_walks].push_back(states[i]);
         if (states[i].empty()) states[i] = first;  // it begins again, as it would at phase 0
       }
     }
@@ -176,7 +178,7 @@ Ways ways_from(const BatchMap& map, const std::vector<NoiseFrame>& frames, const
 
 MeshOptions with_gaits(MeshOptions options, const OtherGaits& gaits) {
   if (gaits.states.size() < 2) return options;
-  options.score_reach = kFarReach;
+  options.score_reach = far_reach;
   options.sources = gaits.sources;
   options.start_action = gaits.start_action;
   options.limit = gaits.limit;
@@ -188,16 +190,16 @@ OtherGaits find_other_gaits(const BatchMap& map, const std::vector<NoiseFrame>& 
   const Search search(map, frames);
   std::vector<std::vector<State>> orbits{{frames.front().centre}};
   std::vector<State> strays = search.seeds(start, mesh, options.seed);
-  search.relax(strays, kFirstRevolutions, orbits);
+  search.relax(strays, first_revolutions, orbits);
   search.thin(strays);
-  search.relax(strays, kMoreRevolutions, orbits);
+  search.relax(strays, more_revolutions, orbits);
   OtherGaits found;
   found.states.push_back(frames.front().centre);
   for (const State& stray : strays) {
     if (search.known(stray, orbits)) continue;
-    if (orbits.size() > kMostGaits)
+    if (orbits.size() > most_gaits)
       throw MapError(
-          fmt::format("return map: it has more than {} other gaits, as at {}", kMostGaits, describe_state(map, stray)));
+          fmt::format("return map: it has more than {} other gaits, as at {}", most_gaits, describe_state(map, stray)));
     orbits.push_back(search.orbit(stray));
     found.states.push_back(stray);
   }

@@ -10,12 +10,13 @@
 namespace metastable::markov {
 namespace {
 
-constexpr double kNarrowestGap = 1.0 / 512;   // of the spacing: gaps are halved so far, to find where failures begin
-constexpr double kForetold = 1e-3;            // stationary sds: what a gap's middle may lie off before it was stepped;
-                                              // afterwards a sixteenth is left
-constexpr double kExtrapolated = 40;          // times that, where a cubic had to look beyond its places
-constexpr int kForeseen = 2;                  // further halvings of a gap that a dear map is asked for ahead
-constexpr double kPerCell = 2, kMost = 1024;  // pairs of Gauss's points a cell of the lattice, and between two places
+constexpr double narrowest_gap = 1.0 / 512;  // of the spacing: gaps are halved so far, to find where failures begin
+constexpr double foretold = 1e-3;            // stationary sds: what a gap's middle may lie off before it was stepped;
+                                             // afterwards a sixteenth is left
+constexpr double extrapolated = 40;          // times that, where a cubic had to look beyond its places
+constexpr int foreseen = 2;                  // further halvings of a gap that a dear map is asked for ahead
+constexpr double per_cell = 2,
+                 pair_limit = 1024;  // pairs of Gauss's points a cell of the lattice, and between two places
 
 using Point = NodeLattice::Point;
 
@@ -108,7 +109,7 @@ class Sharing {
 void share_along(const Cubic& curve, double low, double high, double cells, Sharing& sharing) {
   const double mass = normal_mass(low, high);
   if (!(mass > 0)) return;
-  const double pairs = std::clamp(std::ceil(cells * kPerCell), 1.0, kMost), width = (high - low) / pairs;
+  const double pairs = std::clamp(std::ceil(cells * per_cell), 1.0, pair_limit), width = (high - low) / pairs;
   const double aside = 0.5 / std::numbers::sqrt3;  // Gauss's two points of (-1/2, 1/2)
   const auto each = [&](const auto& use) {
     for (double i = 0.5; i < pairs; i += 1)
@@ -124,7 +125,7 @@ void share_along(const Cubic& curve, double low, double high, double cells, Shar
 
 }  // namespace
 
-ScoreCurve::ScoreCurve(double spacing, double reach) : narrowest_(spacing * kNarrowestGap) {
+ScoreCurve::ScoreCurve(double spacing, double reach) : narrowest_(spacing * narrowest_gap) {
   // The first places stand twice as far apart: what lies between them shows how far the curve can be trusted.
   const double gaps = std::max(2.0, std::ceil(reach / spacing));
   for (double i = 0; i <= gaps; i += 1) asked_.push_back(reach * (2 * i / gaps - 1));
@@ -160,13 +161,13 @@ void ScoreCurve::halve(Place& left, Place& middle, const Place& right, std::size
   middle.open = more && middle.landing.fate != right.landing.fate;
   if (!m) return;
   if (l && r) {
-    const bool rough = off(at, at + 1) > kForetold;
+    const bool rough = off(at, at + 1) > foretold;
     left.open = middle.open = rough && more;
     left.torn = middle.torn = rough && !more;
   } else if (l) {
-    left.open = more && off(at, at) > kExtrapolated * kForetold;
+    left.open = more && off(at, at) > extrapolated * foretold;
   } else if (r) {
-    middle.open = more && off(at + 1, at + 1) > kExtrapolated * kForetold;
+    middle.open = more && off(at + 1, at + 1) > extrapolated * foretold;
   }
 }
 
@@ -295,7 +296,7 @@ class Following {
       if (asked.empty()) return;
       const std::size_t sure = asked.size();
       for (std::size_t n = 0; n < curves.size(); ++n)
-        for (const double score : curves[n].may_ask(kForeseen)) ask(n, score);
+        for (const double score : curves[n].may_ask(foreseen)) ask(n, score);
       for (std::size_t first = 0; first < asked.size();) {
         const std::size_t last = std::min(asked.size(), first + rows_of_a_dear_call);
         step(first, last);

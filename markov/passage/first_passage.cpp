@@ -12,13 +12,13 @@
 namespace metastable::markov {
 namespace {
 
-constexpr double kRoundedStay = 1e-12;  // probabilities of staying below this are the rounding of a row sum
-constexpr double kSumTolerance = 1e-9;
-constexpr double kMeanTolerance = 1e-6;
-constexpr double kConstantHazard = 1e-12;        // relative change of the log survival over a period
-constexpr double kNormalReach = 9;               // standard deviations beyond which a normal has no mass
-constexpr double kInterpolatedRounding = 1e-14;  // of a probability that is a sum of both signs
-constexpr double kSameAsSpectrum = 1e-8;         // agreement wanted with the failure rate of the chain
+constexpr double rounded_stay = 1e-12;  // probabilities of staying below this are the rounding of a row sum
+constexpr double sum_tolerance = 1e-9;
+constexpr double mean_tolerance = 1e-6;
+constexpr double constant_hazard = 1e-12;        // relative change of the log survival over a period
+constexpr double normal_reach = 9;               // standard deviations beyond which a normal has no mass
+constexpr double interpolated_rounding = 1e-14;  // of a probability that is a sum of both signs
+constexpr double same_as_spectrum = 1e-8;        // agreement wanted with the failure rate of the chain
 
 double dot(std::span<const double> a, std::span<const double> b) {
   return std::inner_product(a.begin(), a.end(), b.begin(), 0.0);
@@ -49,7 +49,7 @@ void check_launch(const Launch& launch, std::size_t states) {
     negative = negative || !(launch.interpolated || probability >= 0);
     sum += probability;
   }
-  if (negative || !(std::abs(sum - 1) <= kSumTolerance)) {
+  if (negative || !(std::abs(sum - 1) <= sum_tolerance)) {
     throw std::invalid_argument("launch: probabilities must be >= 0 and sum to 1, got " + std::to_string(sum));
   }
 }
@@ -71,7 +71,7 @@ Moments moments(double mean, double square) { return {mean, std::sqrt(std::max(0
 std::vector<double> mean_first_passage(const ChainSolver& solver) {
   std::vector<double> mean = solver.solve(std::vector<double>(solver.chain().size(), 1.0));
   for (double& steps : mean) {
-    if (!(steps >= 1 - kMeanTolerance))
+    if (!(steps >= 1 - mean_tolerance))
       throw ConvergenceError("first passage", steps,
                              "expected steps below one: the nodes are too few for interpolation");
     steps = std::max(1.0, steps);  // rounding of a row sum may take it an ulp below
@@ -122,7 +122,7 @@ Moments reward_from_launch(const ChainSolver& solver, const Launch& launch, std:
   return moments(dot(launch.after, reward) + dot(launch.after, g), dot(launch.after, square) + dot(launch.after, h));
 }
 
-constexpr double kLogNobody = -690.0;  // 1e-300
+constexpr double log_nobody = -690.0;  // 1e-300
 
 Survival::Survival(const ChainSolver& solver, const QuasiStationary& quasi, const Launch& launch, int limit)
     : log_factor_(std::log1p(-quasi.revolution_failure_rate)), period_(solver.period().period) {
@@ -136,10 +136,10 @@ Survival::Survival(const ChainSolver& solver, const QuasiStationary& quasi, cons
   std::vector<double> log_step;  // not the differences of log_head_: a hazard of 1e-12 would lose its digits there
   double difference = std::numeric_limits<double>::infinity();
   for (int step = 0; step < limit; ++step) {
-    if (surviving <= (std::isinf(log_factor_) ? kRoundedStay : 0)) surviving = 0;
+    if (surviving <= (std::isinf(log_factor_) ? rounded_stay : 0)) surviving = 0;
     log_step.push_back(log_survival(surviving, failing));
     log_head_.push_back(log_head_.back() + log_step.back());
-    if (log_head_.back() < kLogNobody) {  // nobody is left to settle, and nobody comes back
+    if (log_head_.back() < log_nobody) {  // nobody is left to settle, and nobody comes back
       log_factor_ = -std::numeric_limits<double>::infinity();
       return;
     }
@@ -148,9 +148,9 @@ Survival::Survival(const ChainSolver& solver, const QuasiStationary& quasi, cons
       const double now = std::accumulate(end - period, end, 0.0);
       const double before = std::accumulate(end - 2 * period, end - period, 0.0);
       difference = std::abs(now / log_factor_ - 1);
-      const double rounding = chain.interpolated() ? kInterpolatedRounding : 0;
-      if (std::abs(now - before) <= kConstantHazard * std::abs(now) + rounding &&
-          difference <= kSameAsSpectrum + rounding / std::abs(log_factor_))
+      const double rounding = chain.interpolated() ? interpolated_rounding : 0;
+      if (std::abs(now - before) <= constant_hazard * std::abs(now) + rounding &&
+          difference <= same_as_spectrum + rounding / std::abs(log_factor_))
         return;
     }
     for (double& entry : survivors) entry /= surviving;
@@ -195,8 +195,8 @@ double Survival::quantile(double p) const {
   const auto last = static_cast<double>(log_head_.size() - 1);
   const double periods = std::floor((wanted - log_head_.back()) / log_factor_);
   double n = last + std::max(0.0, periods - 1) * period_;
-  constexpr double kWholeNumbers = 9e15;  // above, neighbouring steps are not told apart
-  if (n > kWholeNumbers) return last + (wanted - log_head_.back()) / log_factor_ * period_;
+  constexpr double whole_numbers = 9e15;  // above, neighbouring steps are not told apart
+  if (n > whole_numbers) return last + (wanted - log_head_.back()) / log_factor_ * period_;
   while (log_at(n) > wanted) n += 1;
   return n;
 }
@@ -220,14 +220,14 @@ double normal_distribution(double z) { return 0.5 * std::erfc(-z / std::numbers:
 /// Returns the distribution function of the shifted gamma of mean 0, sd 1 and the given skewness (Pearson's type III);
 /// without skewness it is the normal's.
 double skewed_distribution(double z, double skewness) {
-  constexpr double kSymmetric = 1e-6, kSlight = 0.2;
-  constexpr double kSteepest = 20;  // beyond, a variance of rounding alone speaks
-  skewness = std::clamp(skewness, -kSteepest, kSteepest);
-  if (std::abs(skewness) < kSymmetric) return normal_distribution(z);
+  constexpr double symmetric = 1e-6, slight_share = 0.2;
+  constexpr double steepest = 20;  // beyond, a variance of rounding alone speaks
+  skewness = std::clamp(skewness, -steepest, steepest);
+  if (std::abs(skewness) < symmetric) return normal_distribution(z);
   const double above_edge = 1 + 0.5 * skewness * z;  // over the mean: the gamma begins at 0
   if (above_edge <= 0) return skewness > 0 ? 0 : 1;
   // Wilson and Hilferty 1931: the cube root is normal, to 1e-5 where the skewness is slight.
-  if (std::abs(skewness) < kSlight)
+  if (std::abs(skewness) < slight_share)
     return normal_distribution(6 / skewness * (std::cbrt(above_edge) - 1) + skewness / 6);
   const double shape = 4 / (skewness * skewness);
   return skewness > 0 ? boost::math::gamma_p(shape, shape * above_edge)
@@ -236,7 +236,7 @@ double skewed_distribution(double z, double skewness) {
 
 /// Integrates the normal distribution function with the given sd from -infinity to x.
 double normal_ramp(double x, double sd) {
-  if (std::abs(x) >= kNormalReach * sd) return std::max(0.0, x);
+  if (std::abs(x) >= normal_reach * sd) return std::max(0.0, x);
   const double z = x / sd;
   return sd *
          (z * 0.5 * std::erfc(-z / std::numbers::sqrt2) + std::exp(-0.5 * z * z) / std::sqrt(2 * std::numbers::pi));
@@ -248,7 +248,7 @@ double Component::distribution(double t) const {
   const double sd = std::sqrt(spread ? variance : variance + width * width / 12);
   if (sd == 0 && width == 0) return distance >= 0 ? 1 : 0;
   if (!spread) return skewed_distribution(distance / sd, third / (sd * sd * sd));
-  if (std::abs(distance) >= kNormalReach * sd + 0.5 * width) return distance >= 0 ? 1 : 0;
+  if (std::abs(distance) >= normal_reach * sd + 0.5 * width) return distance >= 0 ? 1 : 0;
   return (normal_ramp(distance + 0.5 * width, sd) - normal_ramp(distance - 0.5 * width, sd)) / width;
 }
 
@@ -286,11 +286,11 @@ class RewardMixture {
   std::vector<Component> mixture_;  ///< absolute
 };
 
-constexpr double kLogNegligible = -39.0;    // survivors fewer than about 1e-17 are let go
-constexpr double kSettledIncrement = 1e-9;  // of mean and variance over a period, relative to the largest reward
-constexpr double kBlockShare = 2e-3;        // length of a tail block over the periods before it
-constexpr double kNegligibleShare = 1e-12;  // of a period's failures: far below what a settled period may still change
-constexpr std::size_t kRewardSteps = 20000;
+constexpr double log_negligible = -39.0;    // survivors fewer than about 1e-17 are let go
+constexpr double settled_increment = 1e-9;  // of mean and variance over a period, relative to the largest reward
+constexpr double block_share = 2e-3;        // length of a tail block over the periods before it
+constexpr double negligible_share = 1e-12;  // of a period's failures: far below what a settled period may still change
+constexpr std::size_t reward_steps = 20000;
 
 /// Returns mean and variance of a whole number from 0 to length - 1 with weights exp(log_factor * k).
 struct Block {
@@ -324,15 +324,15 @@ RewardMixture::RewardMixture(const ChainSolver& solver, const QuasiStationary& q
     const double weight = launch.after[i] * chain_.kill()[i];
     if (weight > 0) atoms_.push_back({weight, reward[i], 0, 0, 0});
   }
-  while (log_surviving_ > kLogNegligible) {
+  while (log_surviving_ > log_negligible) {
     head_.push_back(absorb());
     if (settled()) {
       add_tail();
       break;
     }
-    if (head_.size() > kRewardSteps) {
+    if (head_.size() > reward_steps) {
       throw ConvergenceError("reward iteration", head_.back().weight,
-                             "the reward of a step has not settled after " + std::to_string(kRewardSteps) +
+                             "the reward of a step has not settled after " + std::to_string(reward_steps) +
                                  " steps; a looser tolerance or other rows may do (--method)");
     }
     advance();
@@ -392,9 +392,9 @@ bool RewardMixture::settled() const {
   for (std::size_t i = head_.size() - period_; i < head_.size(); ++i) absorbed += head_[i].weight;
   const double survivors = std::exp(log_surviving_) + (absorbed - head_.back().weight);
   const double expected = -std::expm1(log_factor_) * survivors;
-  const double rounding = chain_.interpolated() ? std::min(1e-6, kInterpolatedRounding / -std::expm1(log_factor_)) : 0;
-  if (!(std::abs(absorbed - expected) <= (kSameAsSpectrum + rounding) * expected)) return false;
-  const double increment = kSettledIncrement + rounding;
+  const double rounding = chain_.interpolated() ? std::min(1e-6, interpolated_rounding / -std::expm1(log_factor_)) : 0;
+  if (!(std::abs(absorbed - expected) <= (same_as_spectrum + rounding) * expected)) return false;
+  const double increment = settled_increment + rounding;
   const double scale = largest_reward_ * static_cast<double>(period_);
   const double factor = std::exp(log_factor_);
   for (std::size_t i = head_.size() - period_; i < head_.size(); ++i) {
@@ -402,7 +402,7 @@ bool RewardMixture::settled() const {
     const Component& before = head_[i - period_];
     const Component& earlier = head_[i - 2 * period_];
     // A phase that hardly ever fails may take for ever to settle.
-    if (now.weight < kNegligibleShare * absorbed) continue;
+    if (now.weight < negligible_share * absorbed) continue;
     const double mean_change = now.mean - 2 * before.mean + earlier.mean;
     const double variance_change = now.variance - 2 * before.variance + earlier.variance;
     if (std::abs(now.weight - factor * before.weight) > increment * now.weight ||
@@ -417,8 +417,8 @@ void RewardMixture::add_tail() {
   const std::size_t first = head_.size() - period_;
   const auto periods_before = static_cast<double>(head_.size() / period_);
   double length = 1;
-  for (double period = 1; period * log_factor_ > kLogNegligible; period += length) {
-    length = std::max(1.0, std::floor(kBlockShare * (period + periods_before)));
+  for (double period = 1; period * log_factor_ > log_negligible; period += length) {
+    length = std::max(1.0, std::floor(block_share * (period + periods_before)));
     const Block block = tilted_block(length, log_factor_);
     const double share = std::exp(period * log_factor_) * std::expm1(length * log_factor_) / std::expm1(log_factor_);
     for (std::size_t i = first; i < head_.size(); ++i) {
@@ -451,10 +451,10 @@ double RewardMixture::quantile(double p) const {
   if (rest_at_launch_ >= p || distribution(low) >= p) return low;
   double high = 0;
   for (const Component& component : mixture_) {
-    high = std::max(high, component.mean + kNormalReach * std::sqrt(component.variance) + component.width);
+    high = std::max(high, component.mean + normal_reach * std::sqrt(component.variance) + component.width);
   }
-  constexpr double kRelative = 1e-13;
-  while (high - low > kRelative * high) {
+  constexpr double relative_tolerance = 1e-13;
+  while (high - low > relative_tolerance * high) {
     const double middle = 0.5 * (low + high);
     (distribution(middle) >= p ? high : low) = middle;
   }

@@ -12,12 +12,12 @@
 namespace metastable::markov {
 namespace {
 
-constexpr double kNever = -std::numeric_limits<double>::infinity();
-constexpr std::size_t kEliminated = 3000;  // states
-constexpr int kProducts = 100000;
-constexpr double kExact = 1e-11;  // relative
+constexpr double log_of_zero = -std::numeric_limits<double>::infinity();
+constexpr std::size_t eliminated = 3000;  // states
+constexpr int product_limit = 100000;
+constexpr double exact = 1e-11;  // relative
 
-double logarithm(double probability) { return probability > 0 ? std::log(probability) : kNever; }
+double logarithm(double probability) { return probability > 0 ? std::log(probability) : log_of_zero; }
 
 void require_size(const char* what, std::size_t given, const Chain& chain) {
   if (given != chain.size())
@@ -34,7 +34,7 @@ class BestPath {
   }
 
   void one_step_earlier() {
-    std::vector<double> worth(best_.size(), kNever);
+    std::vector<double> worth(best_.size(), log_of_zero);
     std::vector<std::uint32_t> to(best_.size(), 0);
     const auto offer = [&](std::size_t i, std::size_t j, double probability) {
       const double log_density = logarithm(probability) - log_measure_[j] + best_[j];
@@ -53,7 +53,7 @@ class BestPath {
   /// Goes from where it is best to start when states are met in proportion to `visits`; the last step comes first.
   std::vector<std::uint32_t> path(std::span<const double> visits) const {
     std::size_t at = 0;
-    double most = kNever;
+    double most = log_of_zero;
     for (std::size_t i = 0; i < best_.size(); ++i) {
       const double log_density = logarithm(visits[i]) - log_measure_[i] + best_[i];
       if (log_density > most) {
@@ -76,16 +76,16 @@ class BestPath {
 /// Solves x = Q x + rhs by products, each from nothing: sums of non-negative numbers that only grow.
 std::vector<double> by_products(const Chain& chain, std::span<const double> rhs) {
   std::vector<double> x(rhs.begin(), rhs.end()), term(x);
-  for (int product = 0; product < kProducts; ++product) {
+  for (int product = 0; product < product_limit; ++product) {
     term = markov::apply(chain, term);
     double most = 0;  // of what this term and, at the same pace, all later ones add
     for (std::size_t i = 0; i < x.size(); ++i) {
       x[i] += term[i];
       if (x[i] > 0) most = std::max(most, term[i] / x[i]);
     }
-    if (most * static_cast<double>(product + 1) <= kExact) return x;
+    if (most * static_cast<double>(product + 1) <= exact) return x;
   }
-  throw ConvergenceError("passage", kExact, "neither the set nor failure is reached within 100000 steps");
+  throw ConvergenceError("passage", exact, "neither the set nor failure is reached within 100000 steps");
 }
 
 }  // namespace
@@ -148,7 +148,7 @@ PassageTo passage_to(const Chain& chain, std::span<const std::uint8_t> set) {
       if (must[n]) passage.steps[undecided[n]] = steps[n];
     }
   };
-  if (undecided.size() <= kEliminated) {
+  if (undecided.size() <= eliminated) {
     const ChainSolver solver = on_states(undecided, [&] { return ChainSolver(inside); });
     fill([&](const std::vector<double>& rhs) { return solver.solve(rhs); });
   } else {

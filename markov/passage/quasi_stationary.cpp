@@ -11,22 +11,22 @@
 namespace metastable::markov {
 namespace {
 
-constexpr int kIterations = 10000;   // of interpolated rows
-constexpr int kPatience = 500;       // of all others, before leading_pair() is asked
-constexpr std::size_t kSmall = 64;   // states, of which leading_pair() is asked at once
-constexpr std::size_t kWhole = 512;  // states of a cyclic chain, up to which leading_pair() takes all of them
-constexpr double kSameEnd = 1e-9;    // of two starts, relative
-constexpr double kWorstResidual = 1e-8;
-constexpr double kSmallEntry = 1e-12;  // of the largest: below it an entry's relative change is not watched
-constexpr double kAccuracy = 1e-13;    // wanted of an entry, relative
-constexpr double kRounding = 1e-11;    // a change that has stopped falling below this is rounding
-constexpr int kStagnant = 8;           // iterations without a smaller change
-constexpr double kRateAccuracy = 1e-14;
-constexpr double kStays = 1e-12;         // a probability of staying below it is the rounding of a row sum
-constexpr double kNobody = 1e-13;        // lambda_1 of interpolated rows from which nobody survives: rounding
-constexpr int kNobodyLeft = 100;         // iterations spent on its vectors
-constexpr double kHardlyAnybody = 1e-6;  // lambda_1 of rows that keep so few that neighbouring eigenvalues are rounding
-constexpr int kFewLeft = kPatience;      // iterations spent on theirs
+constexpr int iteration_limit = 10000;  // of interpolated rows
+constexpr int patience = 500;           // of all others, before leading_pair() is asked
+constexpr std::size_t small = 64;       // states, of which leading_pair() is asked at once
+constexpr std::size_t whole = 512;      // states of a cyclic chain, up to which leading_pair() takes all of them
+constexpr double same_end = 1e-9;       // of two starts, relative
+constexpr double worst_residual = 1e-8;
+constexpr double small_entry = 1e-12;     // of the largest: below it an entry's relative change is not watched
+constexpr double accuracy = 1e-13;        // wanted of an entry, relative
+constexpr double rounding_floor = 1e-11;  // a change that has stopped falling below this is rounding
+constexpr int stagnant = 8;               // iterations without a smaller change
+constexpr double rate_accuracy = 1e-14;
+constexpr double stays = 1e-12;          // a probability of staying below it is the rounding of a row sum
+constexpr double nobody_rate = 1e-13;    // lambda_1 of interpolated rows from which nobody survives: rounding
+constexpr int nobody_left = 100;         // iterations spent on its vectors
+constexpr double hardly_anybody = 1e-6;  // lambda_1 of rows that keep so few that neighbouring eigenvalues are rounding
+constexpr int few_left = patience;       // iterations spent on theirs
 
 double total(const std::vector<double>& v) { return std::accumulate(v.begin(), v.end(), 0.0); }
 
@@ -34,9 +34,9 @@ void divide(std::vector<double>& v, double by) {
   for (double& entry : v) entry /= by;
 }
 
-/// Returns the largest relative change of an entry above kSmallEntry of the largest.
+/// Returns the largest relative change of an entry above small_entry of the largest.
 double relative_change(const std::vector<double>& before, const std::vector<double>& after) {
-  const double floor = kSmallEntry * *std::max_element(after.begin(), after.end());
+  const double floor = small_entry * *std::max_element(after.begin(), after.end());
   double change = 0;
   for (std::size_t i = 0; i < after.size(); ++i) {
     if (after[i] > floor) change = std::max(change, std::abs(after[i] - before[i]) / after[i]);
@@ -44,21 +44,21 @@ double relative_change(const std::vector<double>& before, const std::vector<doub
   return change;
 }
 
-/// Decides when a linearly converging iteration is done: the geometric tail of the changes is below kAccuracy, or they
+/// Decides when a linearly converging iteration is done: the geometric tail of the changes is below accuracy, or they
 /// have stopped falling at the level of rounding.
 class StoppingRule {
  public:
   bool done(double change) {
     // Of the first change it is not known how it falls.
-    const double ratio = std::isinf(previous_) ? kSlowest : std::clamp(change / previous_, 0.0, kSlowest);
+    const double ratio = std::isinf(previous_) ? slowest : std::clamp(change / previous_, 0.0, slowest);
     previous_ = change;
     stagnant_ = change < smallest_ ? 0 : stagnant_ + 1;
     smallest_ = std::min(smallest_, change);
-    return change * ratio / (1 - ratio) <= kAccuracy || (change <= kRounding && stagnant_ >= kStagnant);
+    return change * ratio / (1 - ratio) <= accuracy || (change <= rounding_floor && stagnant_ >= stagnant);
   }
 
  private:
-  static constexpr double kSlowest = 0.9999;
+  static constexpr double slowest = 0.9999;
   double previous_ = std::numeric_limits<double>::infinity();
   double smallest_ = std::numeric_limits<double>::infinity();
   int stagnant_ = 0;
@@ -78,7 +78,7 @@ bool never_returns(const Chain& chain) {
   const std::size_t n = chain.size();
   std::vector<std::size_t> sources(n, 0);
   for (std::size_t i = 0; i < n; ++i) {
-    if (chain.stay(i) > kStays) return false;
+    if (chain.stay(i) > stays) return false;
     for (const std::uint32_t j : chain.columns(i)) ++sources[j];
   }
   std::vector<std::uint32_t> queue;
@@ -158,7 +158,7 @@ std::optional<IteratedPair> iterate(const Chain& chain, const Elimination& elimi
   pair.right.assign(n, 1.0);
   StoppingRule left_rule, right_rule;
   bool left_done = false, right_done = false;
-  while (pair.iterations < (chain.interpolated() ? kIterations : kPatience)) {
+  while (pair.iterations < (chain.interpolated() ? iteration_limit : patience)) {
     ++pair.iterations;
     std::vector<double> left = pair.left;
     const double rate = 1 / iterate_left(chain, elimination, left);
@@ -174,22 +174,22 @@ std::optional<IteratedPair> iterate(const Chain& chain, const Elimination& elimi
     pair.residual = std::max(left_change, right_change);
     left_done = left_rule.done(left_change) || left_done;
     right_done = right_rule.done(right_change) || right_done;
-    const bool settled = left_done && right_done && (rate_change <= kRateAccuracy || left_change <= kAccuracy);
+    const bool settled = left_done && right_done && (rate_change <= rate_accuracy || left_change <= accuracy);
     if (settled) {
       if (chain.interpolated()) return pair;
       pair.residual = std::max(pair.residual, distance_between_ends(chain, elimination, pair));
-      if (pair.residual > kSameEnd) return std::nullopt;
+      if (pair.residual > same_end) return std::nullopt;
       return pair;
     }
-    if (unsettled_ends && ((pair.iterations >= kNobodyLeft && std::abs(1 - rate) <= kNobody) ||
-                           (pair.iterations >= kFewLeft && std::abs(1 - rate) <= kHardlyAnybody))) {
+    if (unsettled_ends && ((pair.iterations >= nobody_left && std::abs(1 - rate) <= nobody_rate) ||
+                           (pair.iterations >= few_left && std::abs(1 - rate) <= hardly_anybody))) {
       // Of vectors that are still changing the rate is that of the survivors they tell of.
       pair.rate = 1 - std::clamp(total(apply_left(chain, pair.left)), 0.0, 1.0);
       pair.settled = false;
       return pair;
     }
   }
-  if (chain.interpolated()) throw ConvergenceError("inverse iteration", pair.residual, still_changing(kIterations));
+  if (chain.interpolated()) throw ConvergenceError("inverse iteration", pair.residual, still_changing(iteration_limit));
   return std::nullopt;
 }
 
@@ -263,7 +263,7 @@ QuasiStationary of_all_classes(const ChainSolver& solver, const IteratedPair& pa
 /// Takes the chain as it is, or, where that would take long, watched once a revolution.
 QuasiStationary by_classes(const ChainSolver& solver) {
   const Period& period = solver.period();
-  if (period.period == 1 || solver.chain().size() <= kWhole) {
+  if (period.period == 1 || solver.chain().size() <= whole) {
     const LeadingPair exact = leading_pair(generator_of(solver.chain()));
     const auto rate = static_cast<double>(exact.rate);
     return {{exact.left.begin(), exact.left.end()},
@@ -370,19 +370,19 @@ QuasiStationary quasi_stationary(const ChainSolver& solver, FewSurvivors few) {
     IteratedPair last = last_survivors(solver.chain());
     return {std::move(last.left), std::move(last.right), 1, 1, last.iterations, 0};
   }
-  if (unsettled || revolution.interpolated() || solver.chain().size() > kSmall) {
+  if (unsettled || revolution.interpolated() || solver.chain().size() > small) {
     const std::optional<IteratedPair> pair = iterate(revolution, solver.revolution_elimination(), few);
     if (pair) {
       QuasiStationary quasi = of_all_classes(solver, *pair);
       if (unsettled || revolution.interpolated()) return quasi;
       // Entries far below the largest settle later than the others, and are not watched.
       quasi.residual = residual_of(solver, quasi);
-      if (quasi.residual <= kSameEnd) return quasi;
+      if (quasi.residual <= same_end) return quasi;
     }
   }
   QuasiStationary quasi = by_classes(solver);
   quasi.residual = residual_of(solver, quasi);
-  if (!(quasi.residual <= kWorstResidual))
+  if (!(quasi.residual <= worst_residual))
     throw ConvergenceError("inverse iteration", quasi.residual, "the vectors found are not those of the chain");
   return quasi;
 }
@@ -443,7 +443,7 @@ std::optional<int> total_variation_mixing(const ChainSolver& solver, const Quasi
   int within = 0;
   for (int step = 0; step <= limit; ++step) {
     const double mass = total(survivors);
-    if (!(mass > (chain.interpolated() ? kNobody : 0))) return std::nullopt;  // nobody is left to be mixed
+    if (!(mass > (chain.interpolated() ? nobody_rate : 0))) return std::nullopt;  // nobody is left to be mixed
     divide(survivors, mass);
     std::vector<double> class_mass(period.classes.size(), 0.0);
     for (std::size_t i = 0; i < survivors.size(); ++i) {

@@ -18,10 +18,10 @@ namespace {
 
 using Matrix = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
 
-constexpr double kFollowedSteps = 4096;      // that are always followed one by one
-constexpr double kFollowedProducts = 2e8;    // entries times steps that are on more states than can be doubled
-constexpr std::size_t kDoubledStates = 512;  // of a chain that is doubled
-constexpr double kStartTolerance = 1e-9;
+constexpr double followed_steps = 4096;      // that are always followed one by one
+constexpr double followed_products = 2e8;    // entries times steps that are on more states than can be doubled
+constexpr std::size_t doubled_states = 512;  // of a chain that is doubled
+constexpr double start_tolerance = 1e-9;
 
 double sum_of(std::span<const double> v) { return std::accumulate(v.begin(), v.end(), 0.0); }
 
@@ -31,7 +31,7 @@ void check(const Chain& chain, std::span<const double> start, std::span<const do
     throw std::invalid_argument(fmt::format("start: {} probabilities given for {} states", start.size(), chain.size()));
   for (std::size_t i = 0; i < start.size(); ++i)
     if (!(start[i] >= 0)) throw std::invalid_argument(fmt::format("start: {} for state {} is below 0", start[i], i));
-  if (!(std::abs(sum_of(start) - 1) <= kStartTolerance))
+  if (!(std::abs(sum_of(start) - 1) <= start_tolerance))
     throw std::invalid_argument(fmt::format("start: probabilities sum to {:.12g}, 1 expected", sum_of(start)));
   for (const double n : steps)
     if (!(n >= 0)) throw std::invalid_argument(fmt::format("steps: {} is below 0", n));
@@ -133,8 +133,8 @@ std::vector<double> survival_after(const Chain& chain, std::span<const double> s
                                    int threads) {
   check(chain, start, steps);
   const double entries = static_cast<double>(chain.entries() + chain.size());
-  const bool doubles = chain.size() <= kDoubledStates;
-  const double most = doubles ? kFollowedSteps : std::max(kFollowedSteps, std::floor(kFollowedProducts / entries));
+  const bool doubles = chain.size() <= doubled_states;
+  const double most = doubles ? followed_steps : std::max(followed_steps, std::floor(followed_products / entries));
   std::vector<double> far, at(steps.size());
   double last = 0;
   for (const double n : steps)

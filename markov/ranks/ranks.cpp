@@ -17,7 +17,7 @@
 namespace metastable::markov {
 namespace {
 
-constexpr int kTextTag = 1;
+constexpr int text_tag = 1;
 
 void require_mpi(int code, const char* what) {
   if (code != MPI_SUCCESS) throw std::runtime_error(std::string("MPI: ") + what + " failed");
@@ -119,14 +119,14 @@ std::string Ranks::first_text(const std::string& own) {
 
 void Ranks::send(const std::string& text) {
   Sent& sent = sent_.emplace_back(Sent{std::make_unique<std::string>(text), MPI_REQUEST_NULL});
-  require_mpi(MPI_Isend(sent.text->data(), as_count(text.size()), MPI_CHAR, 0, kTextTag, MPI_COMM_WORLD, &sent.request),
+  require_mpi(MPI_Isend(sent.text->data(), as_count(text.size()), MPI_CHAR, 0, text_tag, MPI_COMM_WORLD, &sent.request),
               "a message");
 }
 
 std::string Ranks::receive(int from, void (*waiting)()) {
   MPI_Status status;
   for (int here = 0; here == 0;) {
-    require_mpi(MPI_Iprobe(from, kTextTag, MPI_COMM_WORLD, &here, &status), "a message");
+    require_mpi(MPI_Iprobe(from, text_tag, MPI_COMM_WORLD, &here, &status), "a message");
     if (here != 0) break;
     waiting();
     std::this_thread::sleep_for(std::chrono::milliseconds(2));
@@ -134,7 +134,7 @@ std::string Ranks::receive(int from, void (*waiting)()) {
   int length = 0;
   MPI_Get_count(&status, MPI_CHAR, &length);
   std::string text(static_cast<std::size_t>(length), ' ');
-  require_mpi(MPI_Recv(text.data(), length, MPI_CHAR, from, kTextTag, MPI_COMM_WORLD, MPI_STATUS_IGNORE), "a message");
+  require_mpi(MPI_Recv(text.data(), length, MPI_CHAR, from, text_tag, MPI_COMM_WORLD, MPI_STATUS_IGNORE), "a message");
   return text;
 }
 

@@ -12,13 +12,13 @@
 namespace metastable::markov {
 namespace {
 
-constexpr int kProducts = 20000;
-constexpr double kStands = 1e-13;  // relative change of the rate and of entries of the right vector
-constexpr double kMoved = 1e-12;   // distance between distributions
-constexpr int kInARow = 3;
-constexpr double kEigenTolerance = 1e-9;  // products do the rest
-constexpr int kRefinements = 8;
-constexpr double kResidual = 1e-12;  // of expected steps, which are 1 at least
+constexpr int product_limit = 20000;
+constexpr double standing_tolerance = 1e-13;  // relative change of the rate and of entries of the right vector
+constexpr double moved_tolerance = 1e-12;     // distance between distributions
+constexpr int in_a_row = 3;
+constexpr double eigen_tolerance = 1e-9;  // products do the rest
+constexpr int refinements = 8;
+constexpr double residual_tolerance = 1e-12;  // of expected steps, which are 1 at least
 
 template <class T, PetscErrorCode destroy(T*)>
 struct Owned {
@@ -78,7 +78,7 @@ class Solving {
     petsc(EPSSetType(eps, EPSKRYLOVSCHUR));
     petsc(EPSSetWhichEigenpairs(eps, EPS_LARGEST_REAL));
     petsc(EPSSetDimensions(eps, 1, PETSC_DEFAULT, PETSC_DEFAULT));
-    petsc(EPSSetTolerances(eps, kEigenTolerance, 1000));
+    petsc(EPSSetTolerances(eps, eigen_tolerance, 1000));
     petsc(MatCreateVecs(matrix, &real, &imaginary));
     petsc(VecSet(real, 1));
     petsc(EPSSetInitialSpace(eps, 1, &real));
@@ -101,7 +101,7 @@ class Solving {
   }
 
   void count_product() {
-    if (++passage_.products > kProducts)
+    if (++passage_.products > product_limit)
       throw ConvergenceError("mesh", 0, "eigenvectors still change after 20000 products");
   }
 
@@ -117,7 +117,7 @@ class Solving {
     divide_by_phase(x, by_phase([&](std::size_t i) { return x[i]; }));
     std::vector<double> y(x.size());
     double last = 0;
-    for (int stood = 0; stood < kInARow;) {
+    for (int stood = 0; stood < in_a_row;) {
       mesh_.apply_left(x, y);
       count_product();
       divide_by_phase(y, by_phase([&](std::size_t i) { return y[i]; }));
@@ -128,7 +128,8 @@ class Solving {
       log_kept_ = 0;
       for (const double lost : lost_) log_kept_ += std::log1p(-std::min(1.0, lost)) / static_cast<double>(phases_);
       const double rate = phases_ == 1 ? lost_[0] : -std::expm1(log_kept_);
-      const bool stands = std::abs(rate - last) <= kStands * rate && mesh_.ranks().sum(moved) <= kMoved;
+      const bool stands =
+          std::abs(rate - last) <= standing_tolerance * rate && mesh_.ranks().sum(moved) <= moved_tolerance;
       stood = stands ? stood + 1 : 0;
       last = rate;
     }
@@ -144,7 +145,7 @@ class Solving {
       divide_by_phase(x, by_phase([&](std::size_t i) { return pi[i] * x[i]; }));
     };
     normalise(w);
-    for (int stood = 0; stood < kInARow;) {
+    for (int stood = 0; stood < in_a_row;) {
       mesh_.apply(w, y);
       count_product();
       normalise(y);
@@ -152,7 +153,7 @@ class Solving {
       for (std::size_t i = 0; i < w.size(); ++i)
         if (y[i] > 1e-280) change = std::max(change, std::abs(w[i] / y[i] - 1));
       w.swap(y);
-      stood = mesh_.ranks().largest(change) <= kStands ? stood + 1 : 0;
+      stood = mesh_.ranks().largest(change) <= standing_tolerance ? stood + 1 : 0;
     }
   }
 
@@ -233,8 +234,8 @@ class Solving {
       double largest = 0;
       for (const double r : residual) largest = std::max(largest, std::abs(r));
       passage_.residual = mesh_.ranks().largest(largest);
-      if (passage_.residual <= kResidual) return;
-      if (refinement == kRefinements)
+      if (passage_.residual <= residual_tolerance) return;
+      if (refinement == refinements)
         throw ConvergenceError("PETSc", passage_.residual, "expected steps keep a residual");
       PetscScalar* changed = nullptr;  // what PETSc keeps of this vector's norms is of the last one
       petsc(VecGetArray(left_over, &changed));

@@ -36,7 +36,7 @@ analysis::Setting stand_in_base(const Options& o, const Pairs& pairs) {
   return setting;
 }
 
-void add_reality(Options& o) {
+void add_laboratory_options(Options& o) {
   o.group("The virtual laboratory (--reality)");
   o.add_flag("reality", "In the virtual laboratory: motion in continuous time, sharing no formula with the model");
   o.add("effect", "ID:NAME=VALUE,...", "",
@@ -73,7 +73,7 @@ Command simulate() {
         if (asks_for_walker(o)) return run_walker_simulate(walker_simulate_request(o, line));
         const SimulateRequest request = simulate_request(o, line);
         if (o.flag("reality"))
-          run_reality(reality_request(o, request));
+          simulate_in_laboratory(laboratory_request(o, request));
         else
           run_simulate(request);
       },
@@ -257,7 +257,7 @@ void declare_simulate(Options& o) {
   o.add("collisions", "N", "16", "Most collisions of a trial, 1..100000 (walker: strikes, default 1000)");
   o.add("angle-rate", "HZ", "", "Write angle.csv too, as a camera of this rate sees the trials, 10..100000 (120)");
   o.add("angle-noise", "RAD", "", "White noise of the angle, >= 0 (default 0.0002; needs --angle-rate)");
-  add_reality(o);
+  add_laboratory_options(o);
   add_walker(o, "DEG", false);
   o.group("Trials");
   o.add_seed();
@@ -303,12 +303,12 @@ WalkerRequest walker_simulate_request(const Options& o, const std::string& line)
   return walker;
 }
 
-RealityRequest reality_request(const Options& o, const SimulateRequest& plain) {
-  RealityRequest request;
+LaboratoryRequest laboratory_request(const Options& o, const SimulateRequest& plain) {
+  LaboratoryRequest request;
   request.conditions = plain.stand_in ? analysis::stand_in_conditions(plain.setting)
-                                      : std::vector<analysis::RealityCondition>{
+                                      : std::vector<analysis::LaboratoryCondition>{
                                             {fmt::format("{}", plain.setting.slope_deg), plain.setting, plain.trials}};
-  analysis::RealityOptions& reality = request.reality;
+  analysis::LaboratoryOptions& reality = request.reality;
   const analysis::Setting& s = plain.setting;
   const dynamics::NominalValues stated = analysis::stated_values(s.restitution, s.friction, s.wheel.leg_length);
   for (const std::string& text : o.all("effect")) {

@@ -42,7 +42,7 @@ SimulateRequest simulate_request(const Options& options, const std::string& line
 /// Reads the trials of a walker, of which the options tell.
 WalkerRequest walker_simulate_request(const Options& options, const std::string& line);
 /// Reads what --reality adds.
-RealityRequest reality_request(const Options& options, const SimulateRequest& plain);
+LaboratoryRequest laboratory_request(const Options& options, const SimulateRequest& plain);
 DescribeRequest describe_request(const Options& options, const std::string& line);
 DiagnoseRequest diagnose_request(const Options& options, const std::string& line);
 BlindRequest blind_request(const Options& options, const std::string& line);

@@ -10,7 +10,7 @@
 #include "analysis/diagnosis/diagnosis.h"
 #include "analysis/experiment/angle_recording.h"
 #include "analysis/experiment/coast_down.h"
-#include "analysis/experiment/reality.h"
+#include "analysis/experiment/laboratory_experiment.h"
 #include "analysis/motion_capture/collision_finder.h"
 #include "analysis/paper/paper_study.h"
 #include "analysis/sensitivity/propagation.h"
@@ -74,9 +74,9 @@ struct SimulateRequest {
 };
 
 /// Asks for `metastable simulate --reality`.
-struct RealityRequest {
-  std::vector<analysis::RealityCondition> conditions;
-  analysis::RealityOptions reality;
+struct LaboratoryRequest {
+  std::vector<analysis::LaboratoryCondition> conditions;
+  analysis::LaboratoryOptions reality;
   std::vector<std::string> dropped;
   std::optional<analysis::CameraOptions> camera;
   std::string out;

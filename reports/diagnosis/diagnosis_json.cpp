@@ -206,7 +206,7 @@ Json steps_json(const analysis::StepsBeforeFailure& s) {
           {"machine", machine}};
 }
 
-Json visibility_json(const analysis::Visibility& v) {
+Json visibility_json(const analysis::Detectability& v) {
   Json alike = Json::object();
   for (const auto& [effect, share] : v.alike) alike[effect] = number(share);
   return {{"effect", v.effect},

@@ -323,7 +323,7 @@ Table visibility_table(const Diagnosis& d) {
               .notes = {"Smallest: the size that most experiments like this one would find (2 Δ ln L of 16). Alike: "
                         "effects that imitate more than half of its information."},
               .columns = {{"effect"}, {"parameter"}, {"smallest"}, {"unit"}, {"alike"}, {"cannot be told because"}}};
-  for (const analysis::Visibility& v : d.limits.visible) {
+  for (const analysis::Detectability& v : d.limits.visible) {
     std::string alike;
     for (const auto& [effect, share] : v.alike)
       alike += fmt::format("{}{} {:.0f} %", alike.empty() ? "" : ", ", effect, 100 * share);

@@ -21,7 +21,7 @@ Table visibility_lines(const analysis::Diagnosis& d) {
   Table table{.id = "visibility",
               .title = "What these data could have seen (the size most experiments like this one find)",
               .columns = {{"effect"}, {"parameter"}, {"smallest"}, {"unit"}, {"remark"}}};
-  for (const analysis::Visibility& v : d.limits.visible) {
+  for (const analysis::Detectability& v : d.limits.visible) {
     std::string remark = v.undecidable;
     if (remark.empty() && !v.alike.empty()) {
       remark = fmt::format("{:.0f} % like {}", 100 * v.alike.front().second, v.alike.front().first);

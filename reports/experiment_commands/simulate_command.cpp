@@ -87,9 +87,9 @@ SimulatedExperiment simulated_experiment(const SimulateRequest& request, const B
   return made;
 }
 
-SimulatedExperiment simulated_experiment(const RealityRequest& asked, const BeginPart& begin) {
-  RealityRequest request = asked;
-  for (analysis::RealityCondition& condition : request.conditions)
+SimulatedExperiment simulated_experiment(const LaboratoryRequest& asked, const BeginPart& begin) {
+  LaboratoryRequest request = asked;
+  for (analysis::LaboratoryCondition& condition : request.conditions)
     condition.setting = launched(condition.setting, request.reality.seed, request.reality.threads, begin);
   const dynamics::LaboratorySetup setup = analysis::laboratory_setup(request.conditions, request.reality);
   const std::vector<dynamics::LaboratoryTrial> trials =
@@ -100,7 +100,7 @@ SimulatedExperiment simulated_experiment(const RealityRequest& asked, const Begi
   options.comment = provenance_lines(provenance);
   options.dropped = request.dropped;
   options.camera = filmed(request.camera, begin);
-  const analysis::RealityFiles files = analysis::reality_files(request.conditions, setup, trials, options);
+  const analysis::LaboratoryFiles files = analysis::laboratory_files(request.conditions, setup, trials, options);
   SimulatedExperiment made{analysis::source_of(files.files, request.out), {}, provenance};
   made.source.angle_csv = files.angle_csv;
   std::size_t collisions = 0, rested = 0, flown = 0;
@@ -116,6 +116,6 @@ SimulatedExperiment simulated_experiment(const RealityRequest& asked, const Begi
 
 void run_simulate(const SimulateRequest& request) { run_into_folder(request); }
 
-void run_reality(const RealityRequest& request) { run_into_folder(request); }
+void simulate_in_laboratory(const LaboratoryRequest& request) { run_into_folder(request); }
 
 }  // namespace metastable::reports

@@ -12,7 +12,7 @@
 namespace metastable::reports {
 
 void run_simulate(const SimulateRequest& request);
-void run_reality(const RealityRequest& request);
+void simulate_in_laboratory(const LaboratoryRequest& request);
 
 /// Holds the texts of an experiment folder, and what there is to say of it, a line a condition.
 struct SimulatedExperiment {
@@ -22,6 +22,6 @@ struct SimulatedExperiment {
 };
 /// @throws std::invalid_argument as analysis::simulate_trials() and analysis::laboratory_setup()
 SimulatedExperiment simulated_experiment(const SimulateRequest& request, const BeginPart& begin);
-SimulatedExperiment simulated_experiment(const RealityRequest& request, const BeginPart& begin);
+SimulatedExperiment simulated_experiment(const LaboratoryRequest& request, const BeginPart& begin);
 
 }  // namespace metastable::reports

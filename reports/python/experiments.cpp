@@ -161,7 +161,7 @@ HeldExperiment simulate(const py::dict& setting, const py::dict& options, const 
   const SimulateRequest request = simulate_request(*asked, command, pairs);
   HeldExperiment experiment;
   const bool reality = asked->flag("reality");
-  const RealityRequest laboratory = reality ? reality_request(*asked, request) : RealityRequest{};
+  const LaboratoryRequest laboratory = reality ? laboratory_request(*asked, request) : LaboratoryRequest{};
   Call call(progress);
   call.run([&] {
     const BeginPart begin = parts_of(call);

@@ -538,13 +538,16 @@ def _experiment(what):
     return what._held if isinstance(what, Experiment) else _metastable.read_experiment(os.fspath(what))
 
 
-def diagnose(experiment, *, catalogue=(), seed=1, threads=0, progress=None):
+def diagnose(experiment, *, catalogue=(), at_slope=None, at_speed=None, seed=1, threads=0, progress=None):
     """What the nominal model of an experiment lacks: is there a gap, where, which effect causes it, how far it shrinks.
 
     experiment  an Experiment, or the path of an experiment folder
     catalogue   effects to consider, ids of effects(); a pair "a+b" is tried in any case; none: all
+    at_slope    [deg] the machine's expected steps on another slope, too
+    at_speed    [rad/s] the same for another launch, omega just before the first collision
     """
     options = dict(catalogue=[catalogue] if isinstance(catalogue, str) else list(catalogue), seed=seed, threads=threads)
+    options.update({key: value for key, value in (("at_slope", at_slope), ("at_speed", at_speed)) if value is not None})
     command = _called("diagnose", experiment, catalogue=options["catalogue"] or None, seed=seed)
     with _progress.telling(progress, "diagnose") as tell:
         return Diagnosis(_metastable.diagnose(_experiment(experiment), options, command, tell))

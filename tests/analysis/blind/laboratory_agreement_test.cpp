@@ -22,16 +22,17 @@
 namespace metastable::analysis::test {
 namespace {
 
-std::unique_ptr<TransitionModel> model_of(const RealityFiles& made) {
+std::unique_ptr<TransitionModel> model_of(const LaboratoryFiles& made) {
   return wheel_transitions(parse_experiment(source_of(made.files, "laboratory")));
 }
 
-RealityFiles with_effect(const Setting& base, const dynamics::Effect& effect, const std::vector<std::string>& dropped) {
-  std::vector<RealityCondition> conditions = stand_in_conditions(base);
-  for (RealityCondition& c : conditions) c.trials = 25;
-  const RealityOptions reality{.effects = {effect}, .sensor_noise = 0.008, .flight = false, .seed = 5};
+LaboratoryFiles with_effect(const Setting& base, const dynamics::Effect& effect,
+                            const std::vector<std::string>& dropped) {
+  std::vector<LaboratoryCondition> conditions = stand_in_conditions(base);
+  for (LaboratoryCondition& c : conditions) c.trials = 25;
+  const LaboratoryOptions reality{.effects = {effect}, .sensor_noise = 0.008, .flight = false, .seed = 5};
   const dynamics::LaboratorySetup setup = laboratory_setup(conditions, reality);
-  return reality_files(conditions, setup, run_laboratory(setup, 0), {.dropped = dropped});
+  return laboratory_files(conditions, setup, run_laboratory(setup, 0), {.dropped = dropped});
 }
 
 const dynamics::NominalValues true_values = [] {
@@ -158,11 +159,11 @@ TEST(LaboratoryAgreement, RestsThatDidNotHappenAreNoGap) {
   Setting base = stand_in_setting();
   base.slope_deg = 9.59;
   base.initial_speed = {5.83, 0.28};
-  const std::vector<RealityCondition> conditions{{"fast", base, 40}};
+  const std::vector<LaboratoryCondition> conditions{{"fast", base, 40}};
   const dynamics::LaboratorySetup setup =
       laboratory_setup(conditions, {.sensor_noise = 0.008, .flight = false, .seed = 3});
-  const RealityFiles made =
-      reality_files(conditions, setup, run_laboratory(setup, 0), {.dropped = {"omega_plus_rad_s"}});
+  const LaboratoryFiles made =
+      laboratory_files(conditions, setup, run_laboratory(setup, 0), {.dropped = {"omega_plus_rad_s"}});
   ASSERT_EQ(made.files.trials_csv.find("rest"), std::string::npos);
   const auto model = model_of(made);
   const GapMap map = gap_map(*model, fit(*model, true_nuisances(*model, true_values), {}), 300, 1);
@@ -172,15 +173,15 @@ TEST(LaboratoryAgreement, RestsThatDidNotHappenAreNoGap) {
   }
 }
 
-RealityFiles many_rests(const std::vector<std::string>& dropped) {
+LaboratoryFiles many_rests(const std::vector<std::string>& dropped) {
   Setting base = stand_in_setting();
   base.slope_deg = 6.0;
   base.initial_speed = {5.2, 0.28};
   base.first_landing_leg = 3;
-  const std::vector<RealityCondition> conditions{{"slow", base, 100}};
+  const std::vector<LaboratoryCondition> conditions{{"slow", base, 100}};
   const dynamics::LaboratorySetup setup =
       laboratory_setup(conditions, {.sensor_noise = 0.008, .flight = false, .seed = 4});
-  return reality_files(conditions, setup, run_laboratory(setup, 0), {.dropped = dropped});
+  return laboratory_files(conditions, setup, run_laboratory(setup, 0), {.dropped = dropped});
 }
 
 // A good part of the trials come to rest. Rests are the lower end of the next speed's distribution: left out of it, the
@@ -204,7 +205,7 @@ TEST(LaboratoryAgreement, RestsAreNoGap) {
 }
 
 TEST(LaboratoryAgreement, LegsThatWereNotNotedFollowFromTheFirstOneIfTheTransitionsAgree) {
-  RealityFiles made = many_rests({"omega_plus_rad_s", "leg"});
+  LaboratoryFiles made = many_rests({"omega_plus_rad_s", "leg"});
   EXPECT_EQ(model_of(made)->legs(), 8);
   const std::string stated = "first_landing_leg = 3";
   const auto at = made.files.experiment_toml.find(stated);

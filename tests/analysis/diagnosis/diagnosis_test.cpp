@@ -6,7 +6,7 @@
 #include <cmath>
 
 #include "analysis/drum_model/coast_down_transitions.h"
-#include "analysis/experiment/reality.h"
+#include "analysis/experiment/laboratory_experiment.h"
 #include "analysis/experiment/stand_in.h"
 #include "analysis/wheel_model/wheel_nuisances.h"
 #include "tests/analysis/diagnosed.h"
@@ -162,7 +162,7 @@ Experiment with_outside_effect(const std::string& id, double size) {
   auto conditions = stand_in_conditions(stand_in_setting());
   const dynamics::LaboratorySetup setup =
       laboratory_setup(conditions, {.outside = {{id, size}}, .sensor_noise = 0.008, .seed = 31});
-  const ExperimentFiles files = reality_files(conditions, setup, run_laboratory(setup, 0), {}).files;
+  const ExperimentFiles files = laboratory_files(conditions, setup, run_laboratory(setup, 0), {}).files;
   return parse_experiment({"lab", files.experiment_toml, files.collisions_csv, files.trials_csv, {}});
 }
 

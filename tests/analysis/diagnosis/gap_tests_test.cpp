@@ -6,7 +6,7 @@
 
 #include "analysis/fitting/cause_ranking.h"
 #include "analysis/fitting/model_fit.h"
-#include "analysis/gap/left_over.h"
+#include "analysis/gap/facet_evidence.h"
 #include "tests/analysis/line.h"
 
 namespace metastable::analysis {

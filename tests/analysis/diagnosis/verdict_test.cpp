@@ -8,7 +8,7 @@
 #include <vector>
 
 #include "analysis/diagnosis/diagnosis_sentences.h"
-#include "analysis/diagnosis/too_few.h"
+#include "analysis/diagnosis/not_possible.h"
 
 namespace metastable::analysis {
 namespace {
@@ -22,7 +22,7 @@ Diagnosis::Data enough_data() {
 
 // Gives the verdict on causes with their probabilities; the rest is recalibration's.
 Diagnosis judged(std::vector<Cause> ranked, const Odds& unnamed, const Tested& tested, const Diagnosis::Data& data,
-                 const std::vector<Visibility>& visible = {}) {
+                 const std::vector<Detectability>& visible = {}) {
   Diagnosis d;
   d.data = data;
   Probabilities probabilities;
@@ -157,7 +157,7 @@ Diagnosis with_pairs(double share) {
     cause.probability = probability;
     ranked.push_back(cause);
   }
-  Visibility seen;
+  Detectability seen;
   seen.effect = "inertia";
   seen.alike = {{"slope_offset", share}, {"bounce", 0.6}};
   return judged(std::move(ranked), {}, a_gap, enough_data(), {seen});

@@ -248,18 +248,18 @@ TEST(RewardQuantiles, AgreeWithTrials) {
   const Chain chain = reference::random_chain(n, 12, 0.1);
   const Problem problem(chain, even_launch(n, 0.1));
   const std::vector<double> seconds{0.30, 0.35, 0.42, 0.50, 0.61};
-  constexpr int kTrials = 200000;
-  const std::vector<double> totals = totals_of_trials(chain, seconds, kTrials);
+  constexpr int trial_count = 200000;
+  const std::vector<double> totals = totals_of_trials(chain, seconds, trial_count);
   const Moments exact = reward_from_launch(problem.solver, problem.launch, seconds);
-  const double mean = std::accumulate(totals.begin(), totals.end(), 0.0) / kTrials;
-  EXPECT_NEAR(mean, exact.mean, 4 * exact.sd / std::sqrt(kTrials));
+  const double mean = std::accumulate(totals.begin(), totals.end(), 0.0) / trial_count;
+  EXPECT_NEAR(mean, exact.mean, 4 * exact.sd / std::sqrt(trial_count));
   const std::vector<double> p{0.05, 0.25, 0.5, 0.75, 0.95, 0.99};
   const std::vector<double> computed = problem.quantiles(seconds, p);
   EXPECT_EQ(computed[0], 0);
   for (std::size_t i = 1; i < p.size(); ++i) {
     // It lies within sampling error of the probability, and the shape of one step's law (0.02 s here).
-    const auto at = [&](double q) { return totals[static_cast<std::size_t>(q * kTrials)]; };
-    const double se = std::sqrt(p[i] * (1 - p[i]) / kTrials);
+    const auto at = [&](double q) { return totals[static_cast<std::size_t>(q * trial_count)]; };
+    const double se = std::sqrt(p[i] * (1 - p[i]) / trial_count);
     EXPECT_GE(computed[i], at(p[i] - 4 * se) - 0.02) << p[i];
     EXPECT_LE(computed[i], at(std::min(p[i] + 4 * se, 1 - 1e-5)) + 0.02) << p[i];
   }
@@ -278,15 +278,15 @@ TEST(RewardQuantiles, OfFewSkewedStepsAgreeWithTrials) {
   }
   const Chain chain = Chain::from_dense(n, matrix, kill);
   const Problem problem(chain, even_launch(n, 0.1));
-  constexpr int kTrials = 200000;
-  const std::vector<double> totals = totals_of_trials(chain, seconds, kTrials);
+  constexpr int trial_count = 200000;
+  const std::vector<double> totals = totals_of_trials(chain, seconds, trial_count);
   const std::vector<double> p{0.15, 0.2, 0.25, 0.3, 0.4, 0.5, 0.6, 0.75, 0.9, 0.99};
   const std::vector<double> computed = problem.quantiles(seconds, p);
   for (std::size_t i = 0; i < p.size(); ++i) {
     const auto below = std::upper_bound(totals.begin(), totals.end(), computed[i]) - totals.begin();
     const double spacing = 1.0 / n;  // of the atoms after one step
-    EXPECT_NEAR(static_cast<double>(below) / kTrials, p[i],
-                4 * std::sqrt(p[i] * (1 - p[i]) / kTrials) + 0.004 + (p[i] < 0.5 ? 0.4 * spacing : 0))
+    EXPECT_NEAR(static_cast<double>(below) / trial_count, p[i],
+                4 * std::sqrt(p[i] * (1 - p[i]) / trial_count) + 0.004 + (p[i] < 0.5 ? 0.4 * spacing : 0))
         << p[i];
   }
 }

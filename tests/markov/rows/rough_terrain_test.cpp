@@ -51,28 +51,34 @@ class RoughTerrain {
  public:
   explicit RoughTerrain(double sd_degrees) : sd_(sd_degrees * pi / 180) {}
 
-  double fixed_point() const { return (amplitude * std::cos(kMean - kPhi) - (1 - kC) * kG) / (1 - kC); }
+  double fixed_point() const {
+    return (amplitude * std::cos(mean_slope - phase) - (1 - kept_share) * twice_gravity) / (1 - kept_share);
+  }
   /// Returns the density of the next state.
   double density(double from, double to) const {
     const double cosine = level(from, to);
     if (std::abs(cosine) >= 1) return 0;
-    const double z = (kPhi - std::acos(cosine) - kMean) / sd_;
+    const double z = (phase - std::acos(cosine) - mean_slope) / sd_;
     return std::exp(-0.5 * z * z) / (sd_ * std::sqrt(2 * pi) * amplitude * std::sqrt(1 - cosine * cosine));
   }
   /// Returns the probability of x' <= 0, from the error function.
   double kill(double from) const {
-    const double slope = kPhi - std::acos(level(from, 0));
-    return 0.5 * std::erfc((kMean - slope) / (sd_ * std::numbers::sqrt2));
+    const double slope = phase - std::acos(level(from, 0));
+    return 0.5 * std::erfc((mean_slope - slope) / (sd_ * std::numbers::sqrt2));
   }
 
  private:
-  static constexpr double kG = 2 * 9.8, kC = 0.5;
-  static inline const double kA = pi / 8, kMean = 8 * pi / 180;
-  static inline const double amplitude = kG * std::hypot((1 - kC) * std::cos(kA), (1 + kC) * std::sin(kA));
-  static inline const double kPhi = std::atan2((1 + kC) * std::sin(kA), (1 - kC) * std::cos(kA));
+  static constexpr double twice_gravity = 2 * 9.8, kept_share = 0.5;
+  static inline const double half_angle = pi / 8, mean_slope = 8 * pi / 180;
+  static inline const double amplitude =
+      twice_gravity * std::hypot((1 - kept_share) * std::cos(half_angle), (1 + kept_share) * std::sin(half_angle));
+  static inline const double phase =
+      std::atan2((1 + kept_share) * std::sin(half_angle), (1 - kept_share) * std::cos(half_angle));
 
   /// Returns cos(slope - phi) of the slope that leads there.
-  static double level(double from, double to) { return (to - kC * from + (1 - kC) * kG) / amplitude; }
+  static double level(double from, double to) {
+    return (to - kept_share * from + (1 - kept_share) * twice_gravity) / amplitude;
+  }
 
   double sd_;
 };

@@ -1,4 +1,4 @@
-#include "analysis/diagnosis/too_few.h"
+#include "analysis/diagnosis/not_possible.h"
 
 #include <fmt/format.h>
 
@@ -28,7 +28,8 @@ std::optional<std::size_t> trials_to_explain(const Diagnosis::Data& data) {
   return std::max(trials, static_cast<std::size_t>(std::ceil(static_cast<double>(transitions) / each - 1e-9)));
 }
 
-std::vector<NotPossible> too_few(const TransitionModel& model, const Diagnosis& d, const DiagnosisOptions& options) {
+std::vector<NotPossible> not_possible(const TransitionModel& model, const Diagnosis& d,
+                                      const DiagnosisOptions& options) {
   std::vector<NotPossible> all;
   const auto trials = static_cast<double>(d.data.trials);
   const bool gap = is_gap(d.verdict);
@@ -62,7 +63,7 @@ std::vector<NotPossible> too_few(const TransitionModel& model, const Diagnosis& 
                    fmt::format("{:.0f} transitions of a speed for {} legs; a cell of the map takes {}", speeds,
                                model.legs(), least_cell_events),
                    whole(least_cell_events * model.legs() * trials / speeds), true});
-  for (const Visibility& v : d.limits.visible)
+  for (const Detectability& v : d.limits.visible)
     if (v.times_more > 1)
       all.push_back({fmt::format("whether {} is at work", v.effect),
                      "at the end of its range it would still be hidden by the recalibration and the noise",

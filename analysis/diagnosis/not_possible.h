@@ -16,6 +16,7 @@ inline std::size_t trials_for_folds(int folds) { return 2 * static_cast<std::siz
 std::optional<std::size_t> trials_to_explain(const Diagnosis::Data& data);
 
 /// @param d  complete but for `not_possible`
-std::vector<NotPossible> too_few(const TransitionModel& model, const Diagnosis& d, const DiagnosisOptions& options);
+std::vector<NotPossible> not_possible(const TransitionModel& model, const Diagnosis& d,
+                                      const DiagnosisOptions& options);
 
 }  // namespace metastable::analysis

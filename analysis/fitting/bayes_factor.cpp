@@ -1,4 +1,4 @@
-#include "analysis/fitting/evidence.h"
+#include "analysis/fitting/bayes_factor.h"
 
 #include <algorithm>
 #include <cmath>

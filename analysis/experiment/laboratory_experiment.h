@@ -19,14 +19,14 @@ dynamics::NominalValues stated_values(const Spread& restitution, const Spread& f
                                       const std::vector<double>& leg_lengths);
 
 /// Describes one condition as the modeller states it.
-struct RealityCondition {
+struct LaboratoryCondition {
   std::string id;
   Setting setting;  ///< the nominal model
   int trials = 50;  ///< 1 .. 100000
 };
 
 /// Says how reality departs from the nominal model.
-struct RealityOptions {
+struct LaboratoryOptions {
   std::vector<dynamics::Effect> effects = {};
   std::vector<dynamics::OutsideEffect> outside = {};
   double restitution_skewness = 0;
@@ -42,8 +42,8 @@ struct RealityOptions {
 /// Sets up the laboratory of these conditions. Wheel and contact are those of the first.
 /// @throws std::invalid_argument where there is no condition, and naming a setting the laboratory cannot take
 /// (correlation, list of pairs; under settled what Laboratory refuses) or an option out of range
-dynamics::LaboratorySetup laboratory_setup(const std::vector<RealityCondition>& conditions,
-                                           const RealityOptions& options);
+dynamics::LaboratorySetup laboratory_setup(const std::vector<LaboratoryCondition>& conditions,
+                                           const LaboratoryOptions& options);
 /// Returns all trials in the order they were run. They have the same bits on any number of threads.
 std::vector<dynamics::LaboratoryTrial> run_laboratory(const dynamics::LaboratorySetup& setup, int threads,
                                                       const markov::Share& progress = {});
@@ -60,17 +60,18 @@ struct FolderOptions {
 /// Lists the names that FolderOptions::dropped may hold.
 const std::vector<std::string>& droppable();
 
-/// Returns the trials as an experiment without a folder in between: what reading reality_files() back gives, with
-/// digits that the files carry. @throws std::invalid_argument as reality_files()
-Experiment experiment_of(const std::vector<RealityCondition>& conditions, const dynamics::LaboratorySetup& setup,
+/// Returns the trials as an experiment without a folder in between: what reading laboratory_files() back gives, with
+/// digits that the files carry. @throws std::invalid_argument as laboratory_files()
+Experiment experiment_of(const std::vector<LaboratoryCondition>& conditions, const dynamics::LaboratorySetup& setup,
                          const std::vector<dynamics::LaboratoryTrial>& trials, const FolderOptions& options);
 
-struct RealityFiles {
+struct LaboratoryFiles {
   ExperimentFiles files;
   std::optional<std::string> angle_csv;
 };
 /// @throws std::invalid_argument for an unknown name in `dropped`, and where there is no condition
-RealityFiles reality_files(const std::vector<RealityCondition>& conditions, const dynamics::LaboratorySetup& setup,
-                           const std::vector<dynamics::LaboratoryTrial>& trials, const FolderOptions& options);
+LaboratoryFiles laboratory_files(const std::vector<LaboratoryCondition>& conditions,
+                                 const dynamics::LaboratorySetup& setup,
+                                 const std::vector<dynamics::LaboratoryTrial>& trials, const FolderOptions& options);
 
 }  // namespace metastable::analysis

@@ -1,4 +1,4 @@
-#include "analysis/diagnosis/visibility.h"
+#include "analysis/diagnosis/detectability.h"
 
 #include <algorithm>
 #include <cmath>
@@ -27,7 +27,7 @@ double information_on_first(const EffectScan& scan, const Eigen::MatrixXd& own, 
 }
 
 // Says how large the effect is, in the number that it reports, at a size of its first parameter.
-void set_smallest(Visibility& v, const ScannedEffect& scanned, double size) {
+void set_smallest(Detectability& v, const ScannedEffect& scanned, double size) {
   const FreeParameter& p = scanned.candidate->parameters[0];
   std::vector<double> values;
   for (const FreeParameter& one : scanned.candidate->parameters) values.push_back(one.neutral);
@@ -69,11 +69,11 @@ std::vector<std::pair<std::string, double>> alike_to(const EffectScan& scan, con
 
 }  // namespace
 
-std::vector<Visibility> visibility(const EffectScan& scan, const std::vector<const Candidate*>& candidates,
-                                   const Rules& rules) {
-  std::vector<Visibility> all;
+std::vector<Detectability> detectability(const EffectScan& scan, const std::vector<const Candidate*>& candidates,
+                                         const Rules& rules) {
+  std::vector<Detectability> all;
   for (const Candidate* candidate : candidates) {
-    Visibility& v = all.emplace_back();
+    Detectability& v = all.emplace_back();
     v.effect = candidate->id;
     v.undecidable = candidate->undecidable;
     const ScannedEffect* found = scan.find(candidate);

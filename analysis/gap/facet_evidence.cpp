@@ -1,4 +1,4 @@
-#include "analysis/gap/left_over.h"
+#include "analysis/gap/facet_evidence.h"
 
 #include <algorithm>
 #include <boost/math/distributions/chi_squared.hpp>
@@ -8,7 +8,7 @@
 #include <numbers>
 #include <tuple>
 
-#include "analysis/fitting/evidence.h"
+#include "analysis/fitting/bayes_factor.h"
 #include "analysis/fitting/model_fit.h"
 #include "analysis/fitting/transition_model.h"
 #include "analysis/gap/map_columns.h"

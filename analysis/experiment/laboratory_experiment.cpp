@@ -1,4 +1,4 @@
-#include "analysis/experiment/reality.h"
+#include "analysis/experiment/laboratory_experiment.h"
 
 #include <fmt/format.h>
 
@@ -66,8 +66,8 @@ dynamics::NominalValues stated_values(const Spread& restitution, const Spread& f
   return {restitution.mean, restitution.sd, friction.mean, friction.sd, leg_lengths};
 }
 
-dynamics::LaboratorySetup laboratory_setup(const std::vector<RealityCondition>& conditions,
-                                           const RealityOptions& options) {
+dynamics::LaboratorySetup laboratory_setup(const std::vector<LaboratoryCondition>& conditions,
+                                           const LaboratoryOptions& options) {
   if (conditions.empty()) throw std::invalid_argument("laboratory: no condition");
   const Setting& first = conditions.front().setting;
   if (first.correlation != 0 || !first.pairs.empty())
@@ -122,7 +122,7 @@ const std::vector<std::string>& droppable() {
   return names;
 }
 
-Experiment experiment_of(const std::vector<RealityCondition>& conditions, const dynamics::LaboratorySetup& setup,
+Experiment experiment_of(const std::vector<LaboratoryCondition>& conditions, const dynamics::LaboratorySetup& setup,
                          const std::vector<dynamics::LaboratoryTrial>& trials, const FolderOptions& options) {
   if (conditions.empty()) throw std::invalid_argument("laboratory: no condition");
   for (const std::string& name : options.dropped) require_word("drop", name, droppable());
@@ -168,14 +168,15 @@ Experiment experiment_of(const std::vector<RealityCondition>& conditions, const 
   return experiment;
 }
 
-RealityFiles reality_files(const std::vector<RealityCondition>& conditions, const dynamics::LaboratorySetup& setup,
-                           const std::vector<dynamics::LaboratoryTrial>& trials, const FolderOptions& options) {
+LaboratoryFiles laboratory_files(const std::vector<LaboratoryCondition>& conditions,
+                                 const dynamics::LaboratorySetup& setup,
+                                 const std::vector<dynamics::LaboratoryTrial>& trials, const FolderOptions& options) {
   if (options.camera && setup.law == dynamics::Law::settled)
     throw std::invalid_argument(
         "laboratory: a camera is pointed at wheels of published, coulomb or plastic; under settled its collisions are "
         "told alone");
   const Experiment told = experiment_of(conditions, setup, trials, options);
-  RealityFiles result;
+  LaboratoryFiles result;
   ExperimentFiles& files = result.files;
   files.experiment_toml = wheel_description(conditions.front().setting, told.contact.restitution, told.contact.friction,
                                             told.title, options.comment);

@@ -12,8 +12,8 @@ namespace metastable::analysis {
 /// Finds the smallest size of each effect that stands out, from the information at the fit (nuisances projected out),
 /// and the effects that imitate it: the share of its information along its own direction that the other's parameters
 /// explain.
-std::vector<Visibility> visibility(const EffectScan& scan, const std::vector<const Candidate*>& candidates,
-                                   const Rules& rules);
+std::vector<Detectability> detectability(const EffectScan& scan, const std::vector<const Candidate*>& candidates,
+                                         const Rules& rules);
 
 /// Ranks changes of the experiment (TransitionModel::alternatives) by what they would tell between the fitted cause and
 /// its rival, best first: the gain of the fitted size that the rival and the nuisances cannot take up.

@@ -1,4 +1,4 @@
-#include "analysis/diagnosis/visibility.h"
+#include "analysis/diagnosis/detectability.h"
 
 #include <gtest/gtest.h>
 
@@ -32,17 +32,17 @@ std::vector<double> speeds(const TransitionModel& model) {
   return w;
 }
 
-std::vector<Visibility> visible(const TransitionModel& model, const std::vector<Candidate>& candidates) {
+std::vector<Detectability> visible(const TransitionModel& model, const std::vector<Candidate>& candidates) {
   std::vector<const Candidate*> pointers;
   for (const Candidate& candidate : candidates) pointers.push_back(&candidate);
   const Fit plain = fit(model, {3, std::log(0.5)}, {});
-  return visibility(scan_effects(model, plain, pointers, 1), pointers, Rules{});
+  return detectability(scan_effects(model, plain, pointers, 1), pointers, Rules{});
 }
 
-TEST(Visibility, TheSmallestSizeIsThatOfAGainOfSixteen) {
+TEST(Detectability, TheSmallestSizeIsThatOfAGainOfSixteen) {
   const test::Line model = line(0, 7);
   const std::vector<Candidate> candidates{model.candidates()[0]};
-  const Visibility v = visible(model, candidates).front();
+  const Detectability v = visible(model, candidates).front();
   const double sd = std::exp(fit(model, {3, std::log(0.5)}, {}).nuisance[1]);
   const double smallest = std::sqrt(16 / information(speeds(model), sd));
   EXPECT_EQ(v.effect, "slope");
@@ -53,7 +53,7 @@ TEST(Visibility, TheSmallestSizeIsThatOfAGainOfSixteen) {
   EXPECT_NEAR(v.times_more, smallest * smallest / 1e4, 0.02 * smallest * smallest / 1e4);
 }
 
-TEST(Visibility, SaysWhatHidesAnEffect) {
+TEST(Detectability, SaysWhatHidesAnEffect) {
   const test::Line model = line(0, 7);
   Candidate narrow = model.candidates()[0], hopeless = narrow, untold = narrow;
   narrow.id = "narrow";
@@ -61,13 +61,13 @@ TEST(Visibility, SaysWhatHidesAnEffect) {
   hopeless.id = "hopeless";
   hopeless.undecidable = "nobody measured it";
   const std::vector<Candidate> candidates{narrow, hopeless};
-  const std::vector<Visibility> all = visible(model, candidates);
+  const std::vector<Detectability> all = visible(model, candidates);
   EXPECT_EQ(all[0].undecidable, "it would have to pass its range to be seen");
   EXPECT_GT(all[0].times_more, 1);
   EXPECT_EQ(all[1].undecidable, "nobody measured it");
   EXPECT_EQ(all[1].smallest, 0);
   const EffectScan scan = scan_effects(model, fit(model, {3, std::log(0.5)}, {}), {}, 1);
-  EXPECT_EQ(visibility(scan, {&untold}, Rules{}).front().undecidable, "not scanned");
+  EXPECT_EQ(detectability(scan, {&untold}, Rules{}).front().undecidable, "not scanned");
 }
 
 // Models y = mean + a w + b v + noise with v of a given correlation with w, and changed experiments with others.
@@ -122,11 +122,11 @@ double product(const std::vector<double>& a, const std::vector<double>& b) {
   return products - sum_a * sum_b / static_cast<double>(a.size());
 }
 
-TEST(Visibility, AnEffectLooksLikeAnotherByTheShareThatItExplains) {
+TEST(Detectability, AnEffectLooksLikeAnotherByTheShareThatItExplains) {
   for (const double correlation : {0.9, 0.5}) {
     const Plane model(correlation, 11);
     const std::vector<Candidate> candidates = model.candidates();
-    const std::vector<Visibility> all = visible(model, candidates);
+    const std::vector<Detectability> all = visible(model, candidates);
     const std::vector<double> w = speeds(model);
     const double share = std::pow(product(w, model.v()), 2) / (product(w, w) * product(model.v(), model.v()));
     if (correlation == 0.5) {  // too little to be called alike

@@ -1,4 +1,4 @@
-#include "analysis/gap/left_over.h"
+#include "analysis/gap/facet_evidence.h"
 
 #include <gtest/gtest.h>
 
@@ -6,7 +6,7 @@
 #include <cmath>
 #include <random>
 
-#include "analysis/fitting/evidence.h"
+#include "analysis/fitting/bayes_factor.h"
 #include "analysis/fitting/model_fit.h"
 #include "tests/analysis/line.h"
 

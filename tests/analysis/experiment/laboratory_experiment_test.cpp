@@ -1,4 +1,4 @@
-#include "analysis/experiment/reality.h"
+#include "analysis/experiment/laboratory_experiment.h"
 
 #include <gtest/gtest.h>
 
@@ -14,19 +14,19 @@
 namespace metastable::analysis::test {
 namespace {
 
-std::vector<RealityCondition> six_of_each() {
+std::vector<LaboratoryCondition> six_of_each() {
   auto conditions = stand_in_conditions(stand_in_setting());
-  for (RealityCondition& c : conditions) c.trials = 6;
+  for (LaboratoryCondition& c : conditions) c.trials = 6;
   return conditions;
 }
 
-RealityFiles make(RealityOptions reality, FolderOptions folder) {
+LaboratoryFiles make(LaboratoryOptions reality, FolderOptions folder) {
   const auto conditions = six_of_each();
   const dynamics::LaboratorySetup setup = laboratory_setup(conditions, reality);
-  return reality_files(conditions, setup, run_laboratory(setup, reality.threads), folder);
+  return laboratory_files(conditions, setup, run_laboratory(setup, reality.threads), folder);
 }
 
-Experiment read(const RealityFiles& made) {
+Experiment read(const LaboratoryFiles& made) {
   ExperimentSource source = source_of(made.files, "lab");
   source.angle_csv = made.angle_csv;
   return parse_experiment(source);
@@ -101,7 +101,7 @@ TEST(Reality, ExperimentInMemoryIsTheOneReadBackFromItsFiles) {
     for (std::size_t subset = 0; subset < std::size_t{1} << droppable().size();
          subset += law == dynamics::Law::published ? 1 : 37) {
       auto conditions = six_of_each();
-      for (RealityCondition& c : conditions) {
+      for (LaboratoryCondition& c : conditions) {
         c.setting.law = law;
         c.trials = 2;
         c.setting.first_landing_leg = 3;
@@ -113,12 +113,13 @@ TEST(Reality, ExperimentInMemoryIsTheOneReadBackFromItsFiles) {
       const dynamics::LaboratorySetup setup =
           laboratory_setup(conditions, {.sensor_noise = 0.01, .shuffled = true, .seed = subset + 1});
       const auto run = run_laboratory(setup, 1);
-      expect_same(experiment_of(conditions, setup, run, folder), read(reality_files(conditions, setup, run, folder)));
+      expect_same(experiment_of(conditions, setup, run, folder),
+                  read(laboratory_files(conditions, setup, run, folder)));
     }
 }
 
 TEST(Reality, WhatIsDroppedIsNotTold) {
-  const RealityFiles made = make(
+  const LaboratoryFiles made = make(
       {}, {.dropped = {"leg", "time_s", "position_m", "omega_plus_rad_s", "outcome", "initial_speed_rad_s", "noise"}});
   EXPECT_TRUE(made.files.collisions_csv.starts_with("condition,trial,collision,omega_minus_rad_s\n"));
   const Experiment experiment = read(made);
@@ -136,10 +137,10 @@ TEST(Reality, WhatIsDroppedIsNotTold) {
 }
 
 TEST(Reality, SameSeedSameBytesOnAnyNumberOfThreads) {
-  const RealityOptions one{.sensor_noise = 0.01, .shuffled = true, .seed = 5, .threads = 1};
-  RealityOptions two = one;
+  const LaboratoryOptions one{.sensor_noise = 0.01, .shuffled = true, .seed = 5, .threads = 1};
+  LaboratoryOptions two = one;
   two.threads = 2;
-  const RealityFiles a = make(one, {.camera = CameraOptions{}}), b = make(two, {.camera = CameraOptions{}});
+  const LaboratoryFiles a = make(one, {.camera = CameraOptions{}}), b = make(two, {.camera = CameraOptions{}});
   EXPECT_EQ(a.files.collisions_csv, b.files.collisions_csv);
   EXPECT_EQ(a.angle_csv, b.angle_csv);
   two.seed = 6;
@@ -148,7 +149,7 @@ TEST(Reality, SameSeedSameBytesOnAnyNumberOfThreads) {
 
 // Follows the camera's way to the speeds: angle.csv through the finder of collisions, against the true ones.
 TEST(Reality, CollisionsFoundInTheAngleAreTheTrueOnes) {
-  const RealityFiles made = make({}, {.camera = CameraOptions{}});
+  const LaboratoryFiles made = make({}, {.camera = CameraOptions{}});
   const Experiment truth = read(made);
   ExperimentSource source = source_of(made.files, "lab");
   source.collisions_csv.reset();
@@ -177,11 +178,11 @@ TEST(Reality, RefusesWhatTheLaboratoryDoesNotHave) {
   conditions[0].setting.law = dynamics::Law::settled;
   FolderOptions filmed;
   filmed.camera = CameraOptions{};
-  EXPECT_THROW(reality_files(conditions, laboratory_setup(conditions, {}), {}, filmed), std::invalid_argument);
+  EXPECT_THROW(laboratory_files(conditions, laboratory_setup(conditions, {}), {}, filmed), std::invalid_argument);
   EXPECT_THROW(angle_csv({{"settled", conditions[0].setting, {}}}, {}), std::invalid_argument);
   conditions[0].setting.law = dynamics::Law::published;
   EXPECT_THROW(laboratory_setup({}, {}), std::invalid_argument);
-  EXPECT_THROW(reality_files({}, {}, {}, {}), std::invalid_argument);
+  EXPECT_THROW(laboratory_files({}, {}, {}, {}), std::invalid_argument);
 }
 
 }  // namespace
