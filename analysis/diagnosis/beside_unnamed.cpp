@@ -59,6 +59,7 @@ std::map<std::string, double> probabilities_beside_unnamed(const TransitionModel
     with[k] = fit_one_more(model, effort, best.fit, scan.effects[leading[k]]);
   });
   const Fit& joined = *std::ranges::max_element(with, {}, &Fit::penalised);
+  if (!(joined.penalised >= best.fit.penalised)) return {};
   std::vector<double> probability(best.terms.size());
   markov::parallel_for(best.terms.size(), options.threads, [&](std::size_t k) {
     beat();

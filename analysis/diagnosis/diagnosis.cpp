@@ -327,7 +327,7 @@ std::pair<Verdict, Diagnosis::Causes> name_causes(const TransitionModel& model, 
                       probabilities_beside_unnamed(model, fitted.ranking, *hypotheses.best(), fitted.recalibrated,
                                                    chosen.supposed.front().facets, candidates, options,
                                                    [&] { progress(0.86, "what stands beside the unnamed"); }),
-                      chosen.unnamed.of_unnamed(), d.rules);
+                      chosen.unnamed.of_beside(), d.rules);
   if (!named.at_work.empty()) causes.unnamed_facets = facets_by_probability(chosen, named.p_unnamed, d.rules);
   causes.ranked = std::move(probabilities.ranked);
   causes.not_decided = std::move(hypotheses.not_decided);

@@ -27,27 +27,31 @@ std::string with_parameters(const Cause& cause) {
   return text;
 }
 
-// Returns what all causes of a group have in common, if they are pairs that do; else nothing.
-std::string common_effect(const Diagnosis& d) {
-  for (const std::string& effect : d.causes.ranked.front().effects)
-    if (std::ranges::all_of(d.causes.alike, [&](const std::string& name) {
-          return name.starts_with(effect + "+") || name.ends_with("+" + effect);
-        }))
-      return effect;
-  return "";
+std::vector<std::string> parts_of(const std::string& cause) {
+  std::vector<std::string> effects;
+  for (std::size_t from = 0, plus = 0; plus != std::string::npos; from = plus + 1) {
+    plus = cause.find('+', from);
+    effects.push_back(cause.substr(from, plus - from));
+  }
+  return effects;
 }
 
-// Lists the set, what acts alike as one group.
+// Lists the set, what acts alike as one group beside what all of that group hold.
 std::string grouped_set(const Diagnosis& d) {
   if (d.causes.alike.empty()) return fmt::format("{}", fmt::join(d.causes.set, ", "));
-  std::vector<std::string> group = d.causes.alike;
-  const std::string common = common_effect(d);
-  if (!common.empty())
-    for (std::string& name : group)
-      name = name.starts_with(common + "+") ? name.substr(common.size() + 1)
-                                            : name.substr(0, name.size() - common.size() - 1);
-  std::string text = fmt::format("{}{} ({})", common_name(d.data.groups, group),
-                                 common.empty() ? "" : " beside " + common, fmt::join(group, ", "));
+  std::vector<std::vector<std::string>> group;
+  for (const std::string& name : d.causes.alike) group.push_back(parts_of(name));
+  std::vector<std::string> common = d.causes.ranked.front().effects, own;
+  std::erase_if(common, [&](const std::string& effect) {
+    return !std::ranges::all_of(group, [&](const auto& one) { return std::ranges::find(one, effect) != one.end(); });
+  });
+  for (std::vector<std::string>& one : group) {
+    std::erase_if(one, [&](const std::string& effect) { return std::ranges::find(common, effect) != common.end(); });
+    own.push_back(fmt::format("{}", fmt::join(one, "+")));
+  }
+  std::string text =
+      fmt::format("{}{} ({})", common_name(d.data.groups, own),
+                  common.empty() ? "" : fmt::format(" beside {}", fmt::join(common, " and ")), fmt::join(own, ", "));
   for (const std::string& name : d.causes.set)
     if (std::ranges::find(d.causes.alike, name) == d.causes.alike.end()) text += ", " + name;
   return text;
@@ -159,10 +163,10 @@ void say_unexplained(std::vector<std::string>& s, const Diagnosis& d) {
   } else {
     s.push_back("There is a gap that no effect of the catalogue, nor several, removes: something else is at work.");
     if (d.causes.together > d.rules.most_together)
-      s.push_back(
-          fmt::format("The nearest of the catalogue is {}, but these gain {:.1f} times as much together as alone: two "
-                      "causes would add up, these bend each other into the shape of something else.",
-                      d.causes.ranked.front().name(), d.causes.together));
+      s.push_back(fmt::format(
+          "The nearest of the catalogue is {}, but these gain {:.1f} times as much together as alone: separate "
+          "causes would add up, these bend one another into the shape of something else.",
+          d.causes.ranked.front().name(), d.causes.together));
     else if (any && d.causes.ranked.front().gain > worth_naming)
       s.push_back(fmt::format("The nearest of the catalogue is {}; what it leaves is in the map.",
                               d.causes.ranked.front().name()));
@@ -228,8 +232,7 @@ void say_what_closes(std::vector<std::string>& s, const Diagnosis& d) {
 void say_machine_steps(std::vector<std::string>& s, const Diagnosis& d) {
   for (const MachineSteps& machine : d.shrinkage.steps.machine) {
     if (!(machine.steps.lower > 0)) continue;
-    const std::string where =
-        &machine == &d.shrinkage.steps.machine.front() ? "" : fmt::format(" at {}", machine.where);
+    const std::string where = &machine == &d.shrinkage.steps.machine.front() ? "" : " " + machine.where;
     if (machine.at_least) {
       s.push_back(fmt::format("This machine takes at least {:.2g} {}s before failure{} (95 %).", machine.steps.lower,
                               d.data.step_name, where));

@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <array>
 #include <boost/math/distributions/chi_squared.hpp>
 #include <cmath>
 #include <limits>
@@ -20,9 +21,9 @@ namespace {
 constexpr double infinity = std::numeric_limits<double>::infinity();
 // Draws of what stands for the machine, and of the recalibrated model: fewer save time.
 constexpr int draws_of_machine = 16, draws_of_recalibrated = 10;
-constexpr double steps_of_endless = 1e15;  // what stands for a draw that never rests
-constexpr int error_nodes = 81;            // of the grid of a model's error,
-constexpr double error_reach = 4;          //   out to so many sds
+constexpr int error_nodes = 241;   // of the grid of a model's error,
+constexpr double of_no_say = 3;    // sd of the logarithm
+constexpr double error_reach = 4;  //   out to so many sds
 
 // Says whether the fit's information holds all of its parameters.
 bool has_information(const Fit& fit) {
@@ -90,8 +91,7 @@ double weighted_quantile(const std::vector<std::pair<double, double>>& sorted, d
   return sorted.back().first;
 }
 
-double bounded(double steps) { return std::min(steps, steps_of_endless); }
-double unbounded(double steps) { return steps < steps_of_endless / 2 ? steps : infinity; }
+double error_at(int node) { return error_reach * (2.0 * node / (error_nodes - 1) - 1); }
 
 // Says what of the gap the chosen model leaves, in the logarithm of the expected steps. A gap in nats is a square of
 // its size: of what the effect changes, as much may be wrong as the root of the share that stays. Where nothing says
@@ -103,10 +103,10 @@ ModelError model_error(const Diagnosis& d) {
                              ? std::abs(std::log(s.with_effect / s.baseline))
                              : 1;
   double stays = 0;
-  if (d.verdict == Verdict::unexplained) stays = 1;
   if (d.verdict == Verdict::partly_explained)
     stays = known ? std::clamp(1 - *d.shrinkage.measures.front().closed, d.rules.square_error(), 1.0) : 1;
   ModelError error;
+  if (d.verdict == Verdict::unexplained) return {of_no_say, 1};
   error.here = stays > 0 ? std::sqrt(stays) * std::max(1.0, changed) : d.rules.model_error * changed;
   error.elsewhere = std::sqrt(stays);
   return error;
@@ -162,26 +162,38 @@ Estimate joined_steps(const std::vector<double>& here, const std::vector<double>
   if (here.empty() || here.size() != there.size())
     throw std::invalid_argument(fmt::format("joined_steps: {} draws here and {} there", here.size(), there.size()));
   // A few draws stand for all: each is spread by the bandwidth of a normal kernel (Silverman's rule).
-  const double spread =
-      std::hypot(error.here, 1.06 * log_moments(here).sd * std::pow(static_cast<double>(here.size()), -0.2));
+  const double kernel = 1.06 * log_moments(here).sd * std::pow(static_cast<double>(here.size()), -0.2);
   std::vector<std::pair<double, double>> weighed;
-  double most = -infinity;
-  for (std::size_t i = 0; i < here.size(); ++i)
-    for (int k = 0; k < error_nodes; ++k) {
-      const double z = error_reach * (2.0 * k / (error_nodes - 1) - 1);
-      const double expected = at_risk / (bounded(here[i]) * std::exp(spread * z));
-      const double log_weight = -0.5 * z * z + (at_risk > 0 ? rests * std::log(expected) - expected : 0);
-      const double further = std::log(bounded(there[i]) / bounded(here[i]));
-      // How the error differs elsewhere grows with what the model says that is different there.
-      for (const double more : {-1.0, 1.0})
-        weighed.emplace_back(bounded(there[i]) * std::exp(spread * z + more * error.elsewhere * std::abs(further)),
-                             log_weight);
-      most = std::max(most, log_weight);
+  for (std::size_t i = 0; i < here.size(); ++i) {
+    if (!std::isfinite(here[i])) {  // such a machine has no rests
+      if (rests == 0) weighed.emplace_back(there[i], 2 * error_nodes);
+      continue;
     }
-  for (auto& [steps, weight] : weighed) weight = std::exp(weight - most);
+    std::array<double, error_nodes> weight{};
+    double sum = 0;
+    for (int k = 0; k < error_nodes; ++k) {
+      const double z = error_at(k), expected = at_risk / (here[i] * std::exp(error.here * z));
+      // In units of the weight at no error, of which the exponent is within reach of any count.
+      const double without = at_risk / here[i];
+      const double gained = at_risk > 0 ? -rests * error.here * z - (expected - without) : 0;
+      weight[static_cast<std::size_t>(k)] = std::exp(std::min(600.0, gained - 0.5 * z * z));
+      sum += weight[static_cast<std::size_t>(k)];
+    }
+    // How the error differs elsewhere grows with what the model says that is different there.
+    const double further = std::isfinite(there[i]) ? error.elsewhere * std::abs(std::log(there[i] / here[i])) : 0;
+    for (int k = 0; k < error_nodes; ++k)
+      for (const double more : {-1.0, 1.0})
+        for (const double place : {-1.2247, 0.0, 1.2247})  // three equal weights of mean 0 and variance 1
+          weighed.emplace_back(there[i] * std::exp(error.here * error_at(k) + more * further + kernel * place),
+                               weight[static_cast<std::size_t>(k)] / sum * error_nodes / 3);
+  }
+  if (weighed.empty()) {  // every draw is refuted: the count alone is left
+    StepsBeforeFailure counted;
+    set_observed(counted, {at_risk, rests});
+    return {counted.observed, counted.observed_lower, counted.observed_upper};
+  }
   std::ranges::sort(weighed);
-  return {unbounded(weighted_quantile(weighed, 0.5)), unbounded(weighted_quantile(weighed, 0.05)),
-          unbounded(weighted_quantile(weighed, 0.95))};
+  return {weighted_quantile(weighed, 0.5), weighted_quantile(weighed, 0.05), weighted_quantile(weighed, 0.95)};
 }
 
 void add_machine_steps(Diagnosis& d, const TransitionModel& model, const WeighedFit& recalibrated,
@@ -201,7 +213,10 @@ void add_machine_steps(Diagnosis& d, const TransitionModel& model, const Weighed
   const auto add = [&](std::string where, const std::vector<double>& there) {
     MachineSteps machine{std::move(where), joined_steps(of_effects, there, error, at_risk, rests), false};
     machine.at_least = !std::isfinite(machine.steps.upper);
-    s.machine.push_back(std::move(machine));
+    // A model that never fails, and trials that did not: so many steps are seen as no failure excludes.
+    if (machine.at_least && &there == &of_effects && !std::isfinite(machine.steps.lower))
+      machine.steps.lower = s.observed_lower;
+    if (std::isfinite(machine.steps.lower) && machine.steps.lower > 0) s.machine.push_back(std::move(machine));
   };
   add("as measured", of_effects);
   if (options.elsewhere.empty()) return;

@@ -29,8 +29,8 @@ std::vector<double> drawn_steps(const TransitionModel& model, const TransitionMo
                                 const std::vector<WeighedFit>& fits, int draws, std::uint64_t seed, int threads,
                                 const std::function<void()>& heartbeat);
 
-/// Returns the median of draws with their 5 and 95 % quantiles, by the moments of their logarithms; infinite ends where
-/// more than so many never rest. @param draws  not empty
+/// Returns the median of draws with their 5 and 95 % quantiles, by the moments of the logarithms of those that come to
+/// rest; infinite ends where more than so many never do. @param draws  not empty
 Estimate interval_of_draws(const std::vector<double>& draws);
 
 /// What a model lacks, in the logarithm of the expected steps: the sd of its error here, and of how that error differs
@@ -40,13 +40,15 @@ struct ModelError {
 };
 
 /// Joins the draws of a model with the count, by Bayes's rule on a grid of the model's error: that multiplies what the
-/// model says here and there alike.
+/// model says here and there alike. The count corrects that error alone: what it says of the parameters the fits know,
+/// whose likelihood holds every rest.
 /// @param here  draws for the experiment that was counted  @param there  for the one asked about, draw by draw
 /// @param at_risk, rests  at_risk 0: nothing was counted
 Estimate joined_steps(const std::vector<double>& here, const std::vector<double>& there, const ModelError& error,
                       double at_risk, double rests);
 
-/// Fills in the intervals of the models' expected steps, and the machine's own.
+/// Fills in the intervals of the models' expected steps, and the machine's own; none where neither the models nor the
+/// count bound them.
 /// @param fits  the recalibrated model, then those of the hypotheses with their probabilities (none: that model alone)
 /// @param d  with its verdict, its held-out measures and the steps observed and expected
 void add_machine_steps(Diagnosis& d, const TransitionModel& model, const WeighedFit& recalibrated,

@@ -261,13 +261,23 @@ Named give_verdict(const Probabilities& probabilities, const Odds& unnamed, cons
 }
 
 Named corrected(Named named, const std::map<std::string, double>& beside, double unnamed, const Rules& rules) {
+  const auto is_there = [&](const AtWork& one) { return one.probability >= rules.least_at_work; };
+  const auto before = std::ranges::count_if(named.at_work, is_there);
   for (AtWork& one : named.at_work)
     for (const std::string& effect : one.effects)
       if (const auto known = beside.find(effect); known != beside.end())
         one.probability *= 1 - unnamed * (1 - known->second);
   std::ranges::stable_sort(named.at_work, std::ranges::greater{}, &AtWork::probability);
-  if (std::ranges::any_of(named.at_work, [&](const AtWork& one) { return one.probability >= rules.least_at_work; }))
+  const auto after = std::ranges::count_if(named.at_work, is_there);
+  if (after == before) return named;
+  if (after > 0) {  // the set is what is left of it
+    std::string name;
+    for (const AtWork& one : named.at_work)
+      if (is_there(one)) name += (name.empty() ? "" : "+") + one.effects.front();
+    named.set = {name};
+    named.alike.clear();
     return named;
+  }
   named.verdict = Verdict::unexplained;
   named.set.clear();
   named.alike.clear();

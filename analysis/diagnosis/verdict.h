@@ -33,6 +33,8 @@ struct Odds {
     const double with = 1 + std::min(beside, 1.0);
     return with / (with + alone);
   }
+  /// Returns the probability that something without a name stands beside the catalogue where that is at work.
+  double of_beside() const { return (left / (1 + left) + beside) / (1 + beside); }
   /// Returns the probability that something without a name is, alone or beside.
   double of_unnamed() const { return (left / (1 + left) + beside + alone) / (1 + beside + alone); }
 };
@@ -97,7 +99,7 @@ Named give_verdict(const Probabilities& probabilities, const Odds& unnamed, cons
 /// Corrects the probabilities of a partly explained gap by what each effect gains beside the unnamed: an effect that
 /// only takes its shape is not at work, and where none is left the gap is unexplained.
 /// @param beside  probabilities_beside_unnamed(); effects that it lacks stay as they are
-/// @param unnamed  probability that something without a name is at work, given the gap
+/// @param unnamed  Odds::of_beside()
 Named corrected(Named named, const std::map<std::string, double>& beside, double unnamed, const Rules& rules);
 
 }  // namespace metastable::analysis

@@ -71,6 +71,7 @@ CauseRanking rank_causes(const TransitionModel& model, const Fit& recalibrated,
   std::vector<RankedCause> sets = rank_larger_sets(problem, ranked.singles, ranked.pairs);
   bound_by_parts(problem, ranked.singles.causes, ranked.pairs);
   bound_by_parts(problem, ranked.pairs, sets);
+  bound_by_parts(problem, sets, sets);
   reach(1);
   const double p_value = ranked.singles.chance.look_elsewhere(ranked.singles.least_p);
   return {std::move(ranked.singles.scan), std::move(ranked.singles.causes), std::move(ranked.pairs), std::move(sets),

@@ -53,8 +53,8 @@ struct RankingOptions {
   std::function<void(double)> progress;  ///< share done; called from any thread, one at a time; may throw to stop
 };
 
-/// Weighs hypotheses by their evidence (evidence.h); each further effect counts for what it earned. Candidates whose
-/// scores promise less than a fifth of a large best gain are not fitted.
+/// Weighs hypotheses by their evidence (bayes_factor.h); each further effect counts for what it earned. Candidates
+/// whose scores promise less than a fifth of a large best gain are not fitted.
 /// @param candidates  to be considered
 CauseRanking rank_causes(const TransitionModel& model, const Fit& recalibrated,
                          const std::vector<const Candidate*>& candidates, const RankingOptions& options);

@@ -157,6 +157,7 @@ std::vector<RankedCause> rank_larger_sets(const RankingProblem& problem, const S
       larger[i] = with_one_more(problem, singles, base, worth[i]);
     });
     std::erase_if(larger, [](const RankedCause& one) { return !std::isfinite(one.evidence); });
+    bound_by_parts(problem, base.terms.size() == 2 ? pairs : sets, larger);
     const RankedCause* best = best_of(larger);
     if (!best || best->evidence < base.evidence) {
       std::ranges::move(larger, std::back_inserter(sets));

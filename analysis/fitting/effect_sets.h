@@ -33,7 +33,7 @@ double measure_last(const RankingProblem& problem, const SingleEffects& singles,
 double gain_together(const RankingProblem& problem, const SingleEffects& singles, const RankedCause& set);
 
 /// Extends the best pair, one effect after the other, as long as the last one earns its place, up to
-/// Effort::most_effects. What the larger set leaves out again is tried, too: without each of its effects in turn.
+/// Effort::most_effects. A set of three shows pairs, too: what stays of it without one of the first two.
 /// @param pairs  gets pairs that a larger set came upon
 /// @return sets of three and more
 std::vector<RankedCause> rank_larger_sets(const RankingProblem& problem, const SingleEffects& singles,
@@ -42,7 +42,7 @@ std::vector<RankedCause> rank_larger_sets(const RankingProblem& problem, const S
 /// Bounds the evidence of sets by the same without one effect. Evidence shrinks gains by the number of parameters:
 /// eight leg lengths, which take in an eccentric hub, would count for less than the hub with them beside it. A set that
 /// gains nothing beyond a part of it is that part.
-/// @param parts  hypotheses of one effect less
+/// @param parts  hypotheses of one effect less among them; may be `sets`
 void bound_by_parts(const RankingProblem& problem, const std::vector<RankedCause>& parts,
                     std::vector<RankedCause>& sets);
 

@@ -1,6 +1,6 @@
 #pragma once
-// The rules of the diagnosis: every number that decides what a user is told, with its source. Numbers that only save
-// time, or say how a fit is run, stand where they are used.
+// The rules of the diagnosis: the numbers that decide the verdict, with their sources. Numbers that save time, say how
+// a fit is run and when it is decided, how a gap is measured, or what a sentence mentions stand where they are used.
 
 #include <array>
 #include <cstddef>
@@ -23,12 +23,13 @@ struct Rules {
   /// Measurement: effects of engines under the form of the catalogue leave up to 5 % of their size (page of results,
   /// "engines"; `ctest -R EngineDiagnosis`).
   double model_error = 0.06;
-  /// Odds of two effects to one, shared by the partners. Convention: one experiment in twenty has two.
+  /// Odds of one more effect to none more, shared by those that it may be. Convention: of twenty experiments with one
+  /// effect one has two, and so on.
   double pair_prior = 0.05;
   /// Largest logarithm of what one effect of a pair hides of the other's gain by its scatter. Derivation: of n normal
   /// errors a gain of g lowers the variance by exp(-g / n). Convention: no more than a third is put down to that.
   double most_hidden = 0.3;
-  /// Ratio of what a pair gains together to what its effects gain alone, beyond which it describes and does not
+  /// Ratio of what several effects gain together to what they gain alone, beyond which they describe and do not
   /// explain. Measurement: at most 1.12 in 80 simulated pairs, and 1.3 to 2.4 where two effects bend each other into
   /// the shape of a spread of restitution that depends on speed (page "What the blind runs taught").
   double most_together = 1.2;

@@ -45,7 +45,7 @@ std::pair<std::string, std::unique_ptr<TransitionModel>> TransitionModel::elsewh
     const std::vector<NamedValue>& place) const {
   throw std::invalid_argument(
       place.empty() ? std::string("elsewhere: no place is named")
-                    : place.front().first + ": this system's expected steps are known where it was measured alone");
+                    : place.front().first + ": the expected steps of this system are known only where it was measured");
 }
 
 std::string TransitionModel::size_in_words(std::span<const EffectTerm>) const { return {}; }

@@ -18,7 +18,7 @@ struct LeftInFacet {
   double quadratic = 0;  ///< chi-squared of that many degrees where nothing is left, by the model's scatter at least
   double degrees = 0;
   double p_value = 1;   ///< of it
-  double evidence = 0;  ///< log Bayes factor of shifts of all its cells, see rank_causes() for their prior
+  double evidence = 0;  ///< log Bayes factor of shifts of all its cells, see evidence_of_gain()
 };
 
 /// Judges the facets of the map; and what no effect of a catalogue does: every other trial, slow swings over the

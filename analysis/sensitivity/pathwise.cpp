@@ -7,7 +7,7 @@
 #include "analysis/study/pilot.h"
 #include "markov/chain/chain.h"
 #include "markov/passage/adjoint.h"
-#include "markov/rows/discretization.h"
+#include "markov/transition_rows/discretization.h"
 
 namespace metastable::analysis {
 namespace {

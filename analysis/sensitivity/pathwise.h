@@ -4,8 +4,8 @@
 #include <vector>
 
 #include "analysis/study/setting.h"
-#include "markov/rows/draws.h"
-#include "markov/rows/state_space.h"
+#include "markov/transition_rows/draws.h"
+#include "markov/transition_rows/state_space.h"
 
 namespace metastable::analysis {
 

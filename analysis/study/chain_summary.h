@@ -10,7 +10,7 @@
 #include "analysis/study/problem.h"
 #include "markov/chain/solver.h"
 #include "markov/passage/quasi_stationary.h"
-#include "markov/rows/discretization.h"
+#include "markov/transition_rows/discretization.h"
 
 namespace metastable::analysis {
 

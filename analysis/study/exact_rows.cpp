@@ -2,8 +2,8 @@
 
 #include <cstdint>
 
-#include "markov/rows/collocation.h"
-#include "markov/rows/integrated.h"
+#include "markov/transition_rows/collocation.h"
+#include "markov/transition_rows/integrated.h"
 
 namespace metastable::analysis {
 namespace {

@@ -6,14 +6,14 @@
 #include <vector>
 
 #include "analysis/study/problem.h"
-#include "markov/rows/node_rows.h"
+#include "markov/transition_rows/node_rows.h"
 
 namespace metastable::analysis {
 
-/// Densities of the landing (markov/rows/integrated.h) are fast, but `published` alone has smooth ones, and theirs keep
-/// an error that more nodes do not remove: measured, up to 6e-6 of the expected steps where an eta near 0 is not rare,
-/// 1e-7 with the paper's eta. Every other noise, and tolerances below 2e-5, get collocation
-/// (markov/rows/collocation.h).
+/// Densities of the landing (markov/transition_rows/integrated.h) are fast, but `published` alone has smooth ones, and
+/// theirs keep an error that more nodes do not remove: measured, up to 6e-6 of the expected steps where an eta near 0
+/// is not rare, 1e-7 with the paper's eta. Every other noise, and tolerances below 2e-5, get collocation
+/// (markov/transition_rows/collocation.h).
 class ExactRows {
  public:
   /// @throws std::invalid_argument where the map tells neither (names the sampled method)

@@ -14,7 +14,7 @@
 #include "analysis/statistics/t_interval.h"
 #include "analysis/study/chain_summary.h"
 #include "markov/parallel.h"
-#include "markov/rows/draws.h"
+#include "markov/transition_rows/draws.h"
 
 namespace metastable::analysis {
 namespace {

@@ -9,7 +9,7 @@
 #include "analysis/study/pilot.h"
 #include "markov/parallel.h"
 #include "markov/passage/last_steps.h"
-#include "markov/rows/discretization.h"
+#include "markov/transition_rows/discretization.h"
 
 namespace metastable::analysis {
 namespace {

@@ -19,8 +19,8 @@
 #include "analysis/study/steady_launch.h"
 #include "analysis/study/trial_study.h"
 #include "markov/parallel.h"
-#include "markov/rows/chain_pool.h"
-#include "markov/rows/discretization.h"
+#include "markov/transition_rows/chain_pool.h"
+#include "markov/transition_rows/discretization.h"
 
 namespace metastable::analysis {
 namespace {

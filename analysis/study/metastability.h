@@ -28,7 +28,7 @@
 #include "analysis/statistics/estimate.h"
 #include "analysis/study/problem.h"
 #include "analysis/study/setting.h"
-#include "markov/rows/draws.h"
+#include "markov/transition_rows/draws.h"
 
 namespace metastable::analysis {
 

@@ -8,8 +8,8 @@
 
 #include "analysis/study/metastability.h"
 #include "analysis/study/problem.h"
-#include "markov/rows/discretization.h"
-#include "markov/rows/state_space.h"
+#include "markov/transition_rows/discretization.h"
+#include "markov/transition_rows/state_space.h"
 
 namespace metastable::analysis {
 

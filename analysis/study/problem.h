@@ -5,8 +5,8 @@
 #include <functional>
 #include <optional>
 
-#include "markov/rows/return_map.h"
-#include "markov/rows/state_space.h"
+#include "markov/transition_rows/return_map.h"
+#include "markov/transition_rows/state_space.h"
 
 namespace metastable::analysis {
 

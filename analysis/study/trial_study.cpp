@@ -11,7 +11,7 @@
 #include "analysis/statistics/t_interval.h"
 #include "analysis/study/followed_study.h"
 #include "markov/parallel.h"
-#include "markov/rows/draws.h"
+#include "markov/transition_rows/draws.h"
 
 namespace metastable::analysis {
 namespace {

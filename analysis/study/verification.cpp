@@ -16,7 +16,7 @@
 #include "markov/chain/sparse_solver.h"
 #include "markov/parallel.h"
 #include "markov/passage/quasi_stationary.h"
-#include "markov/rows/integrated.h"
+#include "markov/transition_rows/integrated.h"
 
 namespace metastable::analysis {
 namespace {
@@ -87,7 +87,8 @@ std::vector<Benchmark> rough_terrain_benchmarks() {
   std::vector<Benchmark> all;
   for (const double sd : {2.0, 1.5, 1.0, 0.7, 0.6, 0.525}) all.push_back(rough_terrain(sd));
   // These are for the wheel of Byl and Tedrake (IJRR 28, 2009) at a mean slope of 8 deg: its integral equation solved
-  // with numbers of sixty digits. tests/markov/rows/rough_terrain_test.cpp solves it once more, in double precision.
+  // with numbers of sixty digits. tests/markov/transition_rows/rough_terrain_test.cpp solves it once more, in double
+  // precision.
   const double known[][3] = {{2.3121853052586986e-4, 4324.9128766870834, 4326.1846791959863},
                              {1.5280057867965971e-6, 654447.78327473479, 654449.43992398285},
                              {1.1990367683962527e-12, 834002781530.65289, 834002781532.82850}};

@@ -8,7 +8,7 @@
 
 #include "analysis/study/problem.h"
 #include "dynamics/settled/settled_map.h"
-#include "markov/rows/discretization.h"
+#include "markov/transition_rows/discretization.h"
 
 namespace metastable::analysis {
 

@@ -5,7 +5,7 @@
 
 #include "markov/mesh/score_lattice.h"
 #include "markov/parallel.h"
-#include "markov/rows/draws.h"
+#include "markov/transition_rows/draws.h"
 
 namespace metastable::analysis {
 namespace {

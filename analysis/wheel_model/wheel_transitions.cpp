@@ -329,14 +329,14 @@ std::pair<std::string, std::unique_ptr<TransitionModel>> WheelTransitions::elsew
       if (!(value > 0 && value < steepest))
         throw std::invalid_argument(fmt::format("{}: {} is outside (0, {:.4g}) deg", name, value, steepest));
       for (Condition& condition : runs.conditions) condition.slope_deg = value;
-      words.push_back(fmt::format("a slope of {:.6g} deg", value));
+      words.push_back(fmt::format("on a slope of {:.6g} deg", value));
     } else if (name == launch_name) {
       if (!(value > 0 && value < fastest_launch))
         throw std::invalid_argument(fmt::format("{}: {} is outside (0, {}) rad/s", name, value, fastest_launch));
       for (Condition& condition : runs.conditions)
         if (condition.initial_speed) condition.initial_speed->mean = value;
       for (WheelRun& run : runs.runs) run.collisions.front().before = value;
-      words.push_back(fmt::format("a launch at {:.6g} rad/s", value));
+      words.push_back(fmt::format("with launches at {:.6g} rad/s", value));
     } else {
       throw std::invalid_argument(
           fmt::format("{}: a wheel's place is told by {} and {}", name, slope_name, launch_name));

@@ -9,7 +9,7 @@
 #include "markov/mesh/mesh_growth.h"
 #include "markov/mesh/score_curve.h"
 #include "markov/mesh/score_lattice.h"
-#include "markov/rows/draws.h"
+#include "markov/transition_rows/draws.h"
 
 namespace metastable::markov {
 namespace {
@@ -21,7 +21,7 @@ constexpr double others_heat = 2;                      // of the scores but the 
 constexpr double above_nodes = 2;  // of one score: a line fails so much oftener than any node around,
 constexpr double line_fails = 0.3, nodes_fail_share = 0.03;  // of several: more than the first where no node does the
                                                              // second, nor the first under the line's other scores
-constexpr double tolerated_errors = 2;  // standard errors
+constexpr double tolerated_errors = 2;                       // standard errors
 constexpr double jump_worth = 0.01;     // of the rate: a difference of failing between neighbours that is looked into,
 constexpr std::size_t jump_edges = 32;  // so many of them,
 constexpr int jump_halvings = 7;        // so often

@@ -11,7 +11,7 @@
 #include "markov/mesh/mesh_passage.h"
 #include "markov/mesh/score_lattice.h"
 #include "markov/parallel.h"
-#include "markov/rows/draws.h"
+#include "markov/transition_rows/draws.h"
 
 namespace metastable::markov {
 namespace {

@@ -9,7 +9,7 @@
 
 #include "markov/mesh/mesh_growth.h"
 #include "markov/mesh/score_lattice.h"
-#include "markov/rows/draws.h"
+#include "markov/transition_rows/draws.h"
 
 namespace metastable::markov {
 namespace {

@@ -372,8 +372,9 @@ Table undecided_table(const Diagnosis& d) {
 Table next_table(const Diagnosis& d) {
   Table table{.id = "next-experiment",
               .title = "The next experiment",
-              .notes = {"Separation: 2 Δ ln L to be expected between the two leading causes, at the fitted size; from "
-                        "16 on they are told apart."},
+              .notes = {fmt::format("Separation: 2 Δ ln L to be expected between the two leading causes, at the fitted "
+                                    "size; from {:.0f} on most experiments like it tell them apart.",
+                                    d.rules.seen_gain)},
               .columns = {{"change"}, {"separation"}}};
   for (const analysis::NextExperiment& n : d.limits.next) table.rows.push_back({n.change, known(n.separation)});
   return table;

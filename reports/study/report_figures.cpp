@@ -9,7 +9,7 @@
 
 #include "analysis/experiment/experiment_folder.h"
 #include "dynamics/wheel/contact_law.h"
-#include "markov/rows/draws.h"
+#include "markov/transition_rows/draws.h"
 
 namespace metastable::reports {
 namespace {

@@ -10,7 +10,7 @@
 #include "analysis/study/setting.h"
 #include "markov/chain/solver.h"
 #include "markov/passage/first_passage.h"
-#include "markov/rows/integrated.h"
+#include "markov/transition_rows/integrated.h"
 
 namespace {
 

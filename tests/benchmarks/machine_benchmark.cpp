@@ -6,7 +6,7 @@
 #include <cstdint>
 #include <vector>
 
-#include "markov/rows/grid.h"
+#include "markov/transition_rows/grid.h"
 
 namespace {
 

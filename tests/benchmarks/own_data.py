@@ -19,7 +19,7 @@ import subprocess
 import tempfile
 from collections import Counter
 
-VERDICTS = ["no_gap", "recalibrate", "explained", "unexplained"]
+VERDICTS = ["no_gap", "recalibrate", "explained", "partly_explained", "unexplained"]
 
 
 def run(command):
@@ -95,7 +95,7 @@ def table(jobs, keys, threads):
     print("| " + " | ".join(keys + VERDICTS + ["refused", "claims of a gap, 95 %"]) + " |")
     print("|" + "---|" * len(keys) + "--:|" * (len(VERDICTS) + 2))
     for key, count in counts.items():
-        total, claims = sum(count.values()), count["explained"] + count["unexplained"]
+        total, claims = sum(count.values()), count["explained"] + count["partly_explained"] + count["unexplained"]
         low, high = interval(claims, total)
         print("| " + " | ".join([*map(str, key), *(str(count[v]) for v in VERDICTS + ["refused"]),
                                  f"{100 * claims / total:.0f} ({100 * low:.0f} to {100 * high:.0f}) %"]) + " |")

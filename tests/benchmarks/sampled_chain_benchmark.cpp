@@ -3,7 +3,7 @@
 #include <benchmark/benchmark.h>
 
 #include "analysis/study/setting.h"
-#include "markov/rows/discretization.h"
+#include "markov/transition_rows/discretization.h"
 
 namespace {
 

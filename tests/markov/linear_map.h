@@ -11,7 +11,7 @@
 #include <vector>
 
 #include "markov/chain/solver.h"
-#include "markov/rows/node_rows.h"
+#include "markov/transition_rows/node_rows.h"
 
 namespace metastable::markov::testing {
 

@@ -466,8 +466,9 @@ def experiment(settings: Union[Setting, Mapping[Union[str, float], Setting]], co
                noise_sd: Optional[float] = None) -> Experiment: ...
 
 
-def diagnose(experiment: Union[Experiment, Path], *, catalogue: Union[str, Sequence[str]] = (), seed: int = 1,
-             threads: int = 0, progress: Progress = None) -> Diagnosis: ...
+def diagnose(experiment: Union[Experiment, Path], *, catalogue: Union[str, Sequence[str]] = (),
+             at_slope: Optional[float] = None, at_speed: Optional[float] = None, seed: int = 1, threads: int = 0,
+             progress: Progress = None) -> Diagnosis: ...
 
 
 def describe(experiment: Union[Experiment, Path], *, transition: str = "auto",

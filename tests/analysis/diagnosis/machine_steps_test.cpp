@@ -60,21 +60,33 @@ TEST(MachineSteps, AModelThatLacksEverythingLeavesTheCountAlone) {
 // Where nothing was counted, or much less than the model knows, the model's own interval stands.
 TEST(MachineSteps, ACountThatSaysLittleLeavesTheModel) {
   const std::vector<double> draws = lognormal(300, 0.1);
-  const Estimate alone = joined_steps(draws, draws, {0.01, 0}, 0, 0), with = joined_steps(draws, draws, {0.01, 0}, 600, 2);
+  const Estimate alone = joined_steps(draws, draws, {0.01, 0}, 0, 0),
+                 with = joined_steps(draws, draws, {0.01, 0}, 600, 2);
   EXPECT_NEAR(alone.value, 300, 15);
   EXPECT_NEAR(with.value / alone.value, 1, 0.02);
   EXPECT_NEAR(with.lower / alone.lower, 1, 0.05);
 }
 
-// Two witnesses that agree say more than either.
+// A count narrows what a model's error leaves open, and a model what a count does.
 TEST(MachineSteps, AModelAndACountThatAgreeNarrowOneAnother) {
-  const std::vector<double> draws = lognormal(200, 0.3);
-  const Estimate model = interval_of_draws(draws), joined = joined_steps(draws, draws, {0.02, 0}, 4000, 20);
+  const std::vector<double> draws(10, 200.0);
+  const auto width = [](const Estimate& e) { return std::log(e.upper / e.lower); };
+  const Estimate model = joined_steps(draws, draws, {0.4, 0}, 0, 0),
+                 joined = joined_steps(draws, draws, {0.4, 0}, 4000, 20);
   StepsBeforeFailure counted;
   set_observed(counted, {4000, 20});
-  EXPECT_LT(std::log(joined.upper / joined.lower), std::log(model.upper / model.lower));
-  EXPECT_LT(std::log(joined.upper / joined.lower), std::log(counted.observed_upper / counted.observed_lower));
+  EXPECT_LT(width(joined), width(model));
+  EXPECT_LT(width(joined), std::log(counted.observed_upper / counted.observed_lower));
   EXPECT_NEAR(joined.value, 200, 20);
+}
+
+// The likelihood of the fits holds the rests already: parameters are not corrected by them once more.
+TEST(MachineSteps, TheCountSaysNothingOfParametersThatTheFitsKnow) {
+  const std::vector<double> draws = lognormal(200, 0.3);
+  const Estimate alone = joined_steps(draws, draws, {1e-6, 0}, 0, 0),
+                 with = joined_steps(draws, draws, {1e-6, 0}, 4000, 10);
+  EXPECT_NEAR(std::log(with.value / alone.value), 0, 0.15);
+  EXPECT_GT(std::log(with.upper / with.lower), 0.8 * std::log(alone.upper / alone.lower));
 }
 
 // An error that the count shows here multiplies what the model says there; how it differs there widens the interval.
@@ -91,6 +103,15 @@ TEST(MachineSteps, WhatNeverRestsHasNoUpperEnd) {
   const std::vector<double> draws{infinity, infinity, 1e6};
   EXPECT_EQ(joined_steps(draws, draws, {0.1, 0}, 500, 0).upper, infinity);
   EXPECT_THROW(joined_steps(draws, {}, {0.1, 0}, 500, 0), std::invalid_argument);
+}
+
+// Rests refute a model that never fails: the count is left.
+TEST(MachineSteps, RestsRefuteAModelThatNeverFails) {
+  const std::vector<double> draws(5, infinity);
+  const Estimate e = joined_steps(draws, draws, {0.1, 0}, 1000, 10);
+  EXPECT_EQ(e.value, 100);
+  EXPECT_NEAR(e.lower, 1000 / 16.962, 1e-2);
+  EXPECT_NEAR(e.upper, 1000 / 5.4254, 1e-2);
 }
 
 }  // namespace

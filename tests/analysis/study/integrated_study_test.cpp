@@ -14,9 +14,9 @@
 #include "analysis/study/setting.h"
 #include "dynamics/return_map/rough_terrain.h"
 #include "dynamics/return_map/trials.h"
-#include "markov/rows/collocation.h"
-#include "markov/rows/draws.h"
-#include "markov/rows/state_space.h"
+#include "markov/transition_rows/collocation.h"
+#include "markov/transition_rows/draws.h"
+#include "markov/transition_rows/state_space.h"
 #include "tests/analysis/settings.h"
 
 namespace metastable::analysis {

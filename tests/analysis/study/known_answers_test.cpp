@@ -11,7 +11,7 @@
 #include "dynamics/return_map/rough_terrain.h"
 #include "markov/chain/solver.h"
 #include "markov/passage/quasi_stationary.h"
-#include "markov/rows/discretization.h"
+#include "markov/transition_rows/discretization.h"
 #include "tests/analysis/settings.h"
 
 namespace metastable::analysis {
@@ -60,7 +60,8 @@ TEST(KnownAnswers, CoulombOnAGentleSlope) {
 }
 
 // These are for the wheel of Byl and Tedrake (IJRR 28, 2009) at a mean slope of 8 deg: its integral equation solved
-// with numbers of sixty digits. tests/markov/rows/rough_terrain_test.cpp solves it once more, in double precision.
+// with numbers of sixty digits. tests/markov/transition_rows/rough_terrain_test.cpp solves it once more, in double
+// precision.
 struct Rough {
   double sd_deg, rate, from_quasi_stationary, from_fixed_point;
   friend void PrintTo(const Rough& rough, std::ostream* out) { *out << "sd " << rough.sd_deg << " deg"; }

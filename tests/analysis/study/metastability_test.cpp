@@ -14,7 +14,7 @@
 #include "dynamics/return_map/trials.h"
 #include "markov/chain/elimination.h"
 #include "markov/passage/quasi_stationary.h"
-#include "markov/rows/discretization.h"
+#include "markov/transition_rows/discretization.h"
 #include "tests/analysis/settings.h"
 
 namespace metastable::analysis {

@@ -7,7 +7,7 @@
 #include "markov/chain/solver.h"
 #include "markov/mesh/mesh_study.h"
 #include "markov/passage/first_passage.h"
-#include "markov/rows/integrated.h"
+#include "markov/transition_rows/integrated.h"
 #include "tests/analysis/walkers/wheel_batch.h"
 
 namespace metastable::analysis {

@@ -49,9 +49,9 @@ RC_GTEST_PROP(RoughTerrain, LandingsStayInTheInterval, ()) {
   RC_ASSERT(least == -std::numeric_limits<double>::infinity());
 }
 
-// It checks 1 - lambda_1 of the map to sixty digits (see tests/markov/rows/rough_terrain_test.cpp), here from a Nystrom
-// discretisation on Gauss nodes and power iteration; the kill rate of the quasi-stationary distribution is
-// rest_probability averaged over it.
+// It checks 1 - lambda_1 of the map to sixty digits (see tests/markov/transition_rows/rough_terrain_test.cpp), here
+// from a Nystrom discretisation on Gauss nodes and power iteration; the kill rate of the quasi-stationary distribution
+// is rest_probability averaged over it.
 TEST(RoughTerrain, BenchmarkKillRates) {
   constexpr std::array reference{std::pair(2.0, 2.3121853052586986e-4), std::pair(1.5, 1.5280057867965971e-6),
                                  std::pair(1.0, 1.1990367683962527e-12)};

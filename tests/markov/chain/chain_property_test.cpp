@@ -11,7 +11,7 @@
 #include "markov/chain/solver.h"
 #include "markov/passage/first_passage.h"
 #include "markov/passage/quasi_stationary.h"
-#include "markov/rows/discretization.h"
+#include "markov/transition_rows/discretization.h"
 #include "tests/markov/exact_answers.h"
 #include "tests/markov/reference_chains.h"
 

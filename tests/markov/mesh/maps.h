@@ -9,7 +9,7 @@
 #include "markov/chain/solver.h"
 #include "markov/mesh/batch_map.h"
 #include "markov/passage/first_passage.h"
-#include "markov/rows/integrated.h"
+#include "markov/transition_rows/integrated.h"
 #include "tests/markov/linear_map.h"
 
 namespace metastable::markov::testing {

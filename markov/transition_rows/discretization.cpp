@@ -1,4 +1,4 @@
-#include "markov/rows/discretization.h"
+#include "markov/transition_rows/discretization.h"
 
 #include <algorithm>
 #include <array>

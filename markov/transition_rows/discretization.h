@@ -7,9 +7,9 @@
 
 #include "markov/chain/chain.h"
 #include "markov/passage/first_passage.h"
-#include "markov/rows/draws.h"
-#include "markov/rows/return_map.h"
-#include "markov/rows/state_space.h"
+#include "markov/transition_rows/draws.h"
+#include "markov/transition_rows/return_map.h"
+#include "markov/transition_rows/state_space.h"
 
 namespace metastable::markov {
 

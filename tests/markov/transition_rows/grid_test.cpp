@@ -1,4 +1,4 @@
-#include "markov/rows/grid.h"
+#include "markov/transition_rows/grid.h"
 
 #include <gtest/gtest.h>
 #include <rapidcheck/gtest.h>

@@ -1,4 +1,4 @@
-#include "markov/rows/chain_pool.h"
+#include "markov/transition_rows/chain_pool.h"
 
 #include <algorithm>
 #include <stdexcept>

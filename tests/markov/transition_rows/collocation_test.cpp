@@ -1,4 +1,4 @@
-#include "markov/rows/collocation.h"
+#include "markov/transition_rows/collocation.h"
 
 #include <gtest/gtest.h>
 
@@ -8,7 +8,7 @@
 
 #include "markov/chain/solver.h"
 #include "markov/passage/quasi_stationary.h"
-#include "markov/rows/integrated.h"
+#include "markov/transition_rows/integrated.h"
 #include "tests/markov/linear_map.h"
 
 namespace metastable::markov {

@@ -5,7 +5,7 @@
 #include <cstdint>
 #include <vector>
 
-#include "markov/rows/discretization.h"
+#include "markov/transition_rows/discretization.h"
 
 namespace metastable::markov {
 

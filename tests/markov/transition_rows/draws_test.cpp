@@ -1,4 +1,4 @@
-#include "markov/rows/draws.h"
+#include "markov/transition_rows/draws.h"
 
 #include <gtest/gtest.h>
 

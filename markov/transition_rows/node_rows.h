@@ -5,9 +5,9 @@
 #include <span>
 #include <vector>
 
-#include "markov/rows/discretization.h"
-#include "markov/rows/node_space.h"
-#include "markov/rows/return_map.h"
+#include "markov/transition_rows/discretization.h"
+#include "markov/transition_rows/node_space.h"
+#include "markov/transition_rows/return_map.h"
 
 namespace metastable::markov {
 

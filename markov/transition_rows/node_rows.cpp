@@ -1,4 +1,4 @@
-#include "markov/rows/node_rows.h"
+#include "markov/transition_rows/node_rows.h"
 
 #include <algorithm>
 #include <cmath>

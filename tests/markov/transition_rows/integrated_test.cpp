@@ -1,4 +1,4 @@
-#include "markov/rows/integrated.h"
+#include "markov/transition_rows/integrated.h"
 
 #include <gtest/gtest.h>
 

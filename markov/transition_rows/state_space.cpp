@@ -1,4 +1,4 @@
-#include "markov/rows/state_space.h"
+#include "markov/transition_rows/state_space.h"
 
 #include <algorithm>
 #include <cmath>
@@ -6,7 +6,7 @@
 #include <numeric>
 #include <stdexcept>
 
-#include "markov/rows/draws.h"
+#include "markov/transition_rows/draws.h"
 
 namespace metastable::markov {
 namespace {

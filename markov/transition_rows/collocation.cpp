@@ -1,4 +1,4 @@
-#include "markov/rows/collocation.h"
+#include "markov/transition_rows/collocation.h"
 
 #include <algorithm>
 #include <array>

@@ -1,4 +1,4 @@
-#include "markov/rows/discretization.h"
+#include "markov/transition_rows/discretization.h"
 
 #include <gtest/gtest.h>
 
@@ -10,7 +10,7 @@
 
 #include "markov/chain/solver.h"
 #include "markov/passage/quasi_stationary.h"
-#include "markov/rows/chain_pool.h"
+#include "markov/transition_rows/chain_pool.h"
 
 namespace metastable::markov {
 namespace {

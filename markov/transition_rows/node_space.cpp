@@ -1,4 +1,4 @@
-#include "markov/rows/node_space.h"
+#include "markov/transition_rows/node_space.h"
 
 #include <algorithm>
 #include <boost/math/quadrature/gauss.hpp>

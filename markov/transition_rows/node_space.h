@@ -8,7 +8,7 @@
 #include <utility>
 #include <vector>
 
-#include "markov/rows/state_space.h"
+#include "markov/transition_rows/state_space.h"
 
 namespace metastable::markov {
 

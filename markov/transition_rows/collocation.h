@@ -5,7 +5,7 @@
 #include <utility>
 #include <vector>
 
-#include "markov/rows/node_rows.h"
+#include "markov/transition_rows/node_rows.h"
 
 namespace metastable::markov {
 

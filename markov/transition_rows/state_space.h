@@ -7,8 +7,8 @@
 #include <span>
 #include <vector>
 
-#include "markov/rows/grid.h"
-#include "markov/rows/return_map.h"
+#include "markov/transition_rows/grid.h"
+#include "markov/transition_rows/return_map.h"
 
 namespace metastable::markov {
 
