@@ -268,15 +268,14 @@ Table shrinkage_table(const Diagnosis& d) {
 Table steps_table(const Diagnosis& d) {
   const analysis::StepsBeforeFailure& s = d.shrinkage.steps;
   Table table{.id = "steps",
-              .title = "Expected steps before failure",
-              .notes = {"This machine: what its models leave open and what was counted, joined; what the models lack "
-                        "widens it."},
+              .title = "Expected steps before failure (90 % intervals)",
+              .notes = {"This machine: the models, what they lack, and the count of rests."},
               .columns = {{.name = "place"},
-                          {.name = "observed (90 %)", .level = 90},
+                          {.name = "observed", .level = 90},
                           {"as given"},
-                          {.name = "recalibrated (90 %)", .level = 90},
-                          {.name = "with effect (90 %)", .level = 90},
-                          {.name = "this machine (90 %)", .level = 90}}};
+                          {.name = "recalibrated", .level = 90},
+                          {.name = "with effect", .level = 90},
+                          {.name = "this machine", .level = 90}}};
   const auto model = [](double value, const std::optional<Estimate>& interval) {
     return interval ? Cell(Estimate{value, interval->lower, interval->upper}) : positive(value);
   };

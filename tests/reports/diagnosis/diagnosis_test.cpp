@@ -75,6 +75,8 @@ analysis::Diagnosis sample() {
   d.shrinkage.measures = {score, open};
   d.shrinkage.steps = {
       .observed = infinity, .observed_lower = 40, .observed_upper = infinity, .baseline = 50, .with_effect = 70};
+  d.shrinkage.steps.machine = {{"as measured", {90, 60, infinity}, true},
+                               {"on a slope of 8 deg", {120, 80, 170}, false}};
   d.limits.visible = {{"leg_contact", "friction_ratio", 0.04, {{"leg_lengths", 0.7}}, ""},
                       {"sensor_noise", "sd_rad_s", 0, {}, "no noise is stated"}};
   d.limits.missing = {{"leg", {{"leg_contact", "friction_ratio", {}, 0.04, {"friction_patch"}}}}, {"position_m", {}}};
@@ -160,6 +162,8 @@ TEST(DiagnosisJson, InfiniteIsAWordAndUnknownIsNull) {
   const auto json = parsed(sample());
   EXPECT_EQ(json.at("steps_before_failure").at("observed"), "infinite");
   EXPECT_TRUE(json.at("steps_before_failure").at("recalibrated").is_null());
+  EXPECT_TRUE(json.at("steps_before_failure").at("machine").at(0).at("at_least"));
+  EXPECT_EQ(json.at("steps_before_failure").at("machine").at(1).at("interval_90").at(1), 170);
   EXPECT_TRUE(json.at("shrinkage_by_measure").at(1).at("closed").is_null());
   EXPECT_TRUE(json.at("shrinkage_by_measure").at(1).at("closed_interval_90").is_null());
   EXPECT_TRUE(json.at("visibility").at(1).at("smallest").is_null());
@@ -184,6 +188,9 @@ TEST(DiagnosisText, SaysTheVerdictFirstAndAnswersEveryQuestion) {
                            "not known: the gap as given may be none",
                            "Expected steps before failure",
                            "infinite",
+                           "at least 60",
+                           "on a slope of 8 deg",
+                           "120 (80 to 170)",
                            "What these data could have seen",
                            "70 % like leg_lengths",
                            "no noise is stated",
