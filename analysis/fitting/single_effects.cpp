@@ -20,9 +20,6 @@ constexpr double leader_evidence = 2;     // of an effect that is refined, and t
 constexpr double refined_share = 0.7;     // of the best evidence, less
 constexpr double refined_margin = 10;     //   this much, for an effect worth refining and another start
 constexpr double refit_margin = 60;       // evidence below the best, for a fit that did not converge to be tried again
-// A pair gains up to 2.8 times what the stronger of its effects gains alone, and 12 more: an effect for which that is
-// less than the best gain of all leads no pair.
-constexpr double pair_share = 2.8, pair_margin = 12;
 
 // These numbers say how fits are run.
 constexpr int law_steps = 12;          // of another law's fit, from either start

@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "analysis/drum_model/coast_down_transitions.h"
+#include "analysis/fitting/single_effects.h"
 #include "analysis/fitting/stepwise.h"
 #include "tests/analysis/diagnosed.h"
 #include "tests/analysis/line.h"
@@ -23,7 +24,8 @@ using test::SlopeAmongWaves;
 
 RankingOptions few_draws() { return {.threads = 1, .draws = 300, .seed = 1, .progress = {}}; }
 
-// On a line the gain is least squares' and the evidence that of one parameter: 36/37 of half the gain less log(37)/2.
+// On a line the gain is least squares' and the evidence that of one parameter, with g gained before its size is known:
+// g/(1+g) of half the gain less log(1+g)/2.
 TEST(RankCauses, OnALineGainAndEvidenceAreThoseOfLeastSquares) {
   const Line model = line(0.1, 1);
   const Fit plain = fit(model, {0, 0}, {});
@@ -32,7 +34,8 @@ TEST(RankCauses, OnALineGainAndEvidenceAreThoseOfLeastSquares) {
   const RankedCause& cause = ranking.singles[0];
   const Fit with = fit(model, {0, 0}, {{&model.candidates()[0], {}, {0.0}}});
   EXPECT_NEAR(cause.gain, 2 * (with.penalised - plain.penalised), 0.02);
-  EXPECT_NEAR(cause.evidence, 0.5 * cause.gain * 36 / 37 - 0.5 * std::log(37.0), 1e-9);
+  const double g = Rules{}.expected_gain;
+  EXPECT_NEAR(cause.evidence, 0.5 * cause.gain * g / (1 + g) - 0.5 * std::log1p(g), 1e-9);
   EXPECT_NEAR(std::log(cause.p_value), std::log(std::erfc(std::sqrt(0.5 * cause.gain))), 1.5);  // by 300 draws
   EXPECT_TRUE(cause.not_decided.empty());
   EXPECT_TRUE(ranking.pairs.empty());
@@ -76,7 +79,7 @@ TEST(RankCauses, BuildsNoPairOnWhatIsFarBehind) {
   for (const Candidate& candidate : model.candidates()) candidates.push_back(&candidate);
   const CauseRanking ranking = rank_causes(model, fit(model, {0, 0}, {}), candidates, few_draws());
   ASSERT_FALSE(ranking.singles[1].fit.nuisance.empty()) << "the weak effect is no leader";
-  ASSERT_LT(2.8 * ranking.singles[1].gain + 12, ranking.singles[0].gain);
+  ASSERT_LT(pair_share * ranking.singles[1].gain + pair_margin, ranking.singles[0].gain);
   const bool paired = std::any_of(ranking.pairs.begin(), ranking.pairs.end(), [](const RankedCause& pair) {
     return pair.terms[0].candidate->id == "strong" && pair.terms[1].candidate->id == "weak";
   });
