@@ -97,8 +97,8 @@ Figure survival_figure(const std::vector<Studied>& settings, const Provenance& p
   figure.title = "Probability of still rolling, by law and ramp";
   figure.x = {"steps n", ""};
   figure.y = {.label = "P(steps > n)", .logarithmic = true, .high = 1.0};
-  figure.legend = Legend::bottom_left;  // curves fall from the upper left to the lower right
-  figure.height = 420;
+  figure.legend = Legend::below;  // steep curves pass through every corner of the frame
+  figure.height = 480;
   figure.provenance = provenance;
   std::set<dynamics::Law> never_rests;
   for (std::size_t i = 0; i < settings.size(); ++i) {

@@ -195,9 +195,10 @@ Table answer_table(const std::vector<Studied>& studies, const Provenance& proven
 }
 
 std::string rests_text(const std::vector<Studied>& studies) {
+  constexpr double rounding = 1e-12;  // of a share that is one minus another
   const auto percent = [](double share) {
     // A share that is not all must not be rounded up to it.
-    const double shown = 100 * share;
+    const double shown = share < rounding ? 0 : 100 * share;
     return shown > 99.9 && shown < 100 ? std::string("more than 99.9") : format_number(shown, NumberFormat::general, 3);
   };
   std::string text;
@@ -210,7 +211,7 @@ std::string rests_text(const std::vector<Studied>& studies) {
     if (low > high) continue;  // no ramp end
     const std::string name(dynamics::law_name(law)), first = percent(low), last = percent(high);
     text += text.empty() ? "Before the ramp ends, " : ", ";
-    text += high == 0       ? "none rest under " + name
+    text += high < rounding ? "none rest under " + name
             : first == last ? fmt::format("{} % of the trials rest under {}", first, name)
                             : fmt::format("{} to {} % of the trials rest under {}", first, last, name);
   }
