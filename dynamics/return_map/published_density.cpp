@@ -9,6 +9,7 @@
 #include <stdexcept>
 #include <utility>
 
+#include "dynamics/return_map/published_row.h"
 #include "dynamics/return_map/vector_math.h"
 
 // There is one compiled version for each generation of vector units, chosen when the program starts. Fused
@@ -22,15 +23,14 @@
 namespace metastable::dynamics {
 namespace {
 
-constexpr std::size_t lanes = 16;        // landings worked on together
-constexpr std::size_t most_points = 48;  // of the grid over eta
-constexpr double depth = 22;             // windows end where the integrand is e^-depth of its largest value
-constexpr double far_tail = 37;          // [sd]
-constexpr double least_sd = 0.001;       // of eta and mu: between the points narrower ones are lost
-constexpr double split = 0.02;           // eta below which ln eta is the variable
-constexpr double longest = 690;          // -ln eta
-constexpr std::size_t most_forms = 4;    // speeds down to sqrt(1/8) of the slowest survivor's
-constexpr double pi2 = std::numbers::pi * std::numbers::pi;
+using namespace published;
+
+constexpr std::size_t lanes = 16;      // landings worked on together
+constexpr double depth = 22;           // windows end where the integrand is e^-depth of its largest value
+constexpr double far_tail = 37;        // [sd]
+constexpr double least_sd = 0.001;     // of eta and mu: between the points narrower ones are lost
+constexpr double longest = 690;        // -ln eta
+constexpr std::size_t most_forms = 4;  // speeds down to sqrt(1/8) of the slowest survivor's
 
 struct Nodes {  // Gauss-Legendre on [0, 1]
   std::vector<double> at, weight;
@@ -57,96 +57,6 @@ struct Rules {
   const Nodes *main, *tail, *tail_minor, *least, *lower;
 };
 
-/// Holds everything of one row that does not depend on the landing.
-struct Row {
-  double a0, a1, t0, t1, kappa;
-  double rounding;                                                // of eta in s where mu < mu_c
-  double sticking;                                                // mu_c, or 0
-  double normal_sticking;                                         // A there
-  double friction_middle;                                         // the usual mu
-  double s_usual;                                                 // s at the usual eta
-  double potential_zero;                                          // kappa s at eta = 0, where mu < mu_c
-  double least, level_least;                                      // mu of the least loss at eta = 0, g there
-  double restitution, restitution_rate, friction, friction_rate;  // means and 1/sd
-  double lower, upper;                                            // of eta
-  std::size_t points;
-  std::array<double, most_points> eta, a, b_middle, exponent;  // on the grid: 1 - eta^2, b + c A, z^2/2
-  std::size_t tail_points;                                     // of -ln eta, 0 where eta stays above split
-  std::array<double, most_points> y, y_a, y_b_middle, y_exponent;
-};
-
-struct Root {
-  double at, weight;  // weight: 1/|g'|
-};
-
-[[gnu::always_inline]] inline double square(double x) { return x * x; }
-
-// Finds mu > mu_c with g(eta, mu) = level, for b_normal = b + c A with an A near that of the answer.
-[[gnu::always_inline]] inline double rough_friction(const Row& r, double a, double b_normal, double level) {
-  const double second = b_normal * r.t1 - level * r.a1 * r.a1;
-  const double first = 2 * level * r.a0 * r.a1 - a * r.a1 - r.t0 * b_normal;
-  const double zeroth = r.a0 * (a - level * r.a0);
-  return (std::sqrt(std::max(0.0, first * first - 4 * second * zeroth)) - first) / (2 * second);
-}
-
-// Finds the same to rounding, with A at `near`, a friction not far away, and one step of Newton's method.
-[[gnu::always_inline]] inline Root friction_at(const Row& r, double eta, double log_eta, double level, double near) {
-  const double more = 1 + eta, a = (1 - eta) * more, b = more * more;
-  const double c = r.kappa * more * std::sqrt(pi2 + log_eta * log_eta);
-  double mu = rough_friction(r, a, b + c * (r.a0 - r.a1 * near), level);
-  const auto slope = [&](double normal, double product, double bc) __attribute__((always_inline)) {
-    return r.a1 * (2 * level * normal - a - c * product) + (2 * r.t1 * mu - r.t0) * bc;  // of (g - level) A^2
-  };
-  double normal = r.a0 - r.a1 * mu, product = mu * (r.t1 * mu - r.t0), bc = b + c * normal;
-  mu -= ((a - level * normal) * normal + product * bc) / slope(normal, product, bc);
-  normal = r.a0 - r.a1 * mu;
-  product = mu * (r.t1 * mu - r.t0);
-  bc = b + c * normal;
-  return {mu, normal * normal / slope(normal, product, bc)};
-}
-
-// Finds eta with g(eta, mu) = level up to the change of s, for mu < mu_c; ratio = mu B/A.
-[[gnu::always_inline]] inline double rough_restitution(const Row& r, double ratio, double normal, double level) {
-  const double e = r.kappa * ratio * normal * r.s_usual, half = 0.5 * (2 * ratio + e), first = 1 - ratio;
-  return (half + std::sqrt(std::max(0.0, half * half + first * (1 + ratio + e - level * normal)))) / first;
-}
-
-[[gnu::always_inline]] inline Root restitution_at(const Row& r, double mu, double level) {
-  const double normal = r.a0 - r.a1 * mu, ratio = mu * (r.t1 * mu - r.t0) / normal;
-  const double pull = r.kappa * ratio * normal;
-  double eta = std::max(0.0, rough_restitution(r, ratio, normal, level)), slope = 1;
-  for (int i = 0; i < 2; ++i) {  // the quadratic that s leaves when it is replaced by its tangent
-    const double far2 = eta * eta + r.rounding * r.rounding, log_far = 0.5 * vector_log(far2);
-    const double s = std::sqrt(pi2 + log_far * log_far), speed = pull * log_far * eta / (far2 * s);
-    const double p0 = 1 + ratio + pull * s - speed * eta, p1 = ratio - 1 + speed;
-    slope = std::sqrt(std::max(0.0, square(p0 + p1) - 4 * p1 * (p0 - level * normal)));
-    eta = std::max(0.0, -(p0 + p1 + slope) / (2 * p1));
-  }
-  return {eta, normal / slope};
-}
-
-[[gnu::always_inline]] inline double friction_exponent(const Row& r, double mu) {
-  return 0.5 * square((mu - r.friction) * r.friction_rate);
-}
-[[gnu::always_inline]] inline double restitution_exponent(const Row& r, double eta) {
-  return 0.5 * square((eta - r.restitution) * r.restitution_rate);
-}
-
-// Finds where, below mu_c, the curve leaves eta = 0, on this side of the least loss (-1, +1); `least` if it does not.
-[[gnu::always_inline]] inline double reaching_zero(const Row& r, double level, double side) {
-  const double c = r.potential_zero, b = 1 + c * (r.a0 - r.a1 * r.least);
-  const double second = b * r.t1 - level * r.a1 * r.a1;
-  const double first = 2 * level * r.a0 * r.a1 - r.a1 - r.t0 * b, zeroth = r.a0 * (1 - level * r.a0);
-  double mu = (side * std::sqrt(std::max(0.0, first * first - 4 * second * zeroth)) - first) / (2 * second);
-  for (int i = 0; i < 3; ++i) {
-    const double normal = r.a0 - r.a1 * mu, product = mu * (r.t1 * mu - r.t0), bc = 1 + c * normal;
-    const double derivative = r.a1 * (2 * level * normal - 1 - c * product) + (2 * r.t1 * mu - r.t0) * bc;
-    const double step = ((1 - level * normal) * normal + product * bc) / derivative;
-    mu -= side * derivative > 0 ? step : 0;
-  }
-  return level > r.level_least ? mu : r.least;
-}
-
 using Lanes = std::array<double, lanes>;
 
 // Holds what the steps below know of the curves g = level of `lanes` landings. Each step goes through all lanes;
@@ -161,7 +71,7 @@ struct Curves {
   alignas(64) std::array<Lanes, most_points> exponent;  // on the grid of the step
 };
 
-[[gnu::always_inline]] inline void begin(const Row& r, const double* levels, Curves& c) {
+[[gnu::always_inline]] inline void begin(const PublishedRow& r, const double* levels, Curves& c) {
   for (std::size_t l = 0; l < lanes; ++l) {
     c.level[l] = levels[l];
     c.low[l] = std::sqrt(std::max(0.0, 1 - c.level[l] * r.normal_sticking));
@@ -170,12 +80,12 @@ struct Curves {
   }
 }
 
-[[gnu::always_inline]] inline void expect_usual_friction(const Row& r, Curves& c) {
+[[gnu::always_inline]] inline void expect_usual_friction(const PublishedRow& r, Curves& c) {
   for (std::size_t l = 0; l < lanes; ++l) c.near[l] = c.last[l] = r.friction_middle;
 }
 
 // Finds the window above mu_c and above split from a grid over eta.
-[[gnu::always_inline]] inline void window_above(const Row& r, Curves& c) {
+[[gnu::always_inline]] inline void window_above(const PublishedRow& r, Curves& c) {
   alignas(64) Lanes limit;
   const double lower = r.tail_points > 0 ? split : r.lower, at_sticking = friction_exponent(r, r.sticking);
   for (std::size_t q = 0; q < r.points; ++q)
@@ -207,7 +117,7 @@ struct Curves {
   return (exponent < 700) & (value > 0) ? value : 0;
 }
 
-[[gnu::always_inline]] inline void add_above(const Row& r, const Nodes& rule, Curves& c) {
+[[gnu::always_inline]] inline void add_above(const PublishedRow& r, const Nodes& rule, Curves& c) {
   expect_usual_friction(r, c);
   for (std::size_t k = 0; k < rule.at.size(); ++k) {
     const double at = rule.at[k], weight = rule.weight[k];
@@ -224,7 +134,7 @@ struct Curves {
 
 // Finds the window above mu_c and below split, over y = -ln eta: long contacts are rare, but they lose much.
 // @return by how much the least exponent there exceeds that above split, in the lane where it does so least
-[[gnu::always_inline]] inline double window_tail(const Row& r, Curves& c) {
+[[gnu::always_inline]] inline double window_tail(const PublishedRow& r, Curves& c) {
   alignas(64) Lanes limit;
   for (std::size_t q = 0; q < r.tail_points; ++q)
     for (std::size_t l = 0; l < lanes; ++l)
@@ -256,7 +166,7 @@ struct Curves {
   return nearest;
 }
 
-[[gnu::always_inline]] inline void add_tail(const Row& r, const Nodes& rule, Curves& c) {
+[[gnu::always_inline]] inline void add_tail(const PublishedRow& r, const Nodes& rule, Curves& c) {
   expect_usual_friction(r, c);
   for (std::size_t k = 0; k < rule.at.size(); ++k) {
     const double at = rule.at[k], weight = rule.weight[k];
@@ -276,7 +186,7 @@ enum class Lower { before_least, after_least };
 
 // Finds the window of a part below mu_c from a grid over mu.
 // @return whether the integrand matters in any lane
-[[gnu::always_inline]] inline bool window_below(const Row& r, Lower part, Curves& c) {
+[[gnu::always_inline]] inline bool window_below(const PublishedRow& r, Lower part, Curves& c) {
   constexpr std::size_t steps = 6;
   alignas(64) Lanes least, limit, start, width;
   for (std::size_t l = 0; l < lanes; ++l) {
@@ -313,7 +223,7 @@ enum class Lower { before_least, after_least };
   return true;
 }
 
-[[gnu::always_inline]] inline void add_below(const Row& r, const Nodes& rule, Curves& c) {
+[[gnu::always_inline]] inline void add_below(const PublishedRow& r, const Nodes& rule, Curves& c) {
   for (std::size_t k = 0; k < rule.at.size(); ++k) {
     const double at = rule.at[k], weight = rule.weight[k];
     for (std::size_t l = 0; l < lanes; ++l) {
@@ -328,7 +238,7 @@ enum class Lower { before_least, after_least };
 
 // Integrates exp(-z_eta^2/2 - z_mu^2/2) / |grad g| along the curves g = level, lane by lane.
 METASTABLE_WIDEST
-void along_curves(const Row& r, const double* levels, const Rules& rules, double* sums) {
+void along_curves(const PublishedRow& r, const double* levels, const Rules& rules, double* sums) {
   Curves c;
   begin(r, levels, c);
   window_above(r, c);
@@ -373,7 +283,7 @@ double integrate(std::pair<double, double> range, const F& f) {
 }
 
 // Returns P(g > level): what lies beyond the upper part of the curve, and below the lower one.
-double rest(const Row& r, const TruncatedNormal& restitution, const TruncatedNormal& friction, double level) {
+double rest(const PublishedRow& r, const TruncatedNormal& restitution, const TruncatedNormal& friction, double level) {
   const double open = 1 - level * r.normal_sticking, low = std::sqrt(std::max(0.0, open));
   const double lower = r.tail_points > 0 ? split : r.lower;
   double sum = 0;
@@ -425,78 +335,7 @@ double normalisation(const TruncatedNormal& n) {  // density over exp(-z^2/2)
   return n.density(at) * std::exp(0.5 * z * z);
 }
 
-double stretched(double eta, double rounding) {  // s
-  const double log_eta = 0.5 * std::log(std::max(eta * eta + rounding * rounding, 1e-300));
-  return std::sqrt(pi2 + log_eta * log_eta);
-}
-
-// Sets what a row has of the contact; geometry, kappa, rounding and mu_c are set.
-void set_contact(Row& r, const TruncatedNormal& restitution, const TruncatedNormal& friction) {
-  r.restitution = restitution.mean();
-  r.restitution_rate = 1 / restitution.sd();
-  r.friction = friction.mean();
-  r.friction_rate = 1 / friction.sd();
-  r.friction_middle = std::max(r.friction, r.sticking);
-  if (r.a1 > 0) r.friction_middle = std::min(r.friction_middle, 0.5 * r.a0 / r.a1);
-  r.s_usual = stretched(std::clamp(r.restitution, 0.1, 1.0), 0);
-  r.potential_zero = r.kappa * stretched(r.rounding, 0);
-}
-
-// Sets a row's values on the grid over eta; its contact is set. @param s  on the grid
-void set_grid(Row& r, const std::vector<double>& grid, const std::vector<double>& s, double lower) {
-  const double normal_middle = r.a0 - r.a1 * r.friction_middle;
-  r.lower = lower;
-  r.upper = grid.back();
-  r.points = grid.size();
-  for (std::size_t q = 0; q < grid.size(); ++q) {
-    const double eta = r.eta[q] = grid[q];
-    r.a[q] = 1 - eta * eta;
-    r.b_middle[q] = (1 + eta) * (1 + eta) + r.kappa * (1 + eta) * s[q] * normal_middle;
-    r.exponent[q] = restitution_exponent(r, eta);
-  }
-}
-
-// Sets a row's values on the grid over -ln eta. @param restitution  eta there
-void set_tail(Row& r, const std::vector<double>& tail, const std::vector<double>& restitution) {
-  const double normal_middle = r.a0 - r.a1 * r.friction_middle;
-  r.tail_points = tail.size();
-  for (std::size_t q = 0; q < tail.size(); ++q) {
-    const double y = r.y[q] = tail[q], eta = restitution[q], more = 1 + eta;
-    r.y_a[q] = 1 - eta * eta;
-    r.y_b_middle[q] = more * more + r.kappa * more * std::sqrt(pi2 + y * y) * normal_middle;
-    r.y_exponent[q] = y + restitution_exponent(r, eta);
-  }
-}
-
-// Finds the least loss at eta = 0, below mu_c, by halving.
-void set_least(Row& r) {
-  double low = 0, high = r.sticking;
-  for (int i = 0; i < 40; ++i) {
-    const double mu = 0.5 * (low + high), normal = r.a0 - r.a1 * mu;
-    const double product = mu * (r.t1 * mu - r.t0), rise = (2 * r.t1 * mu - r.t0) * normal;
-    const double slope =
-        r.a1 * normal + rise + 2 * product * r.a1 + r.potential_zero * normal * (rise + product * r.a1);
-    (slope < 0 ? low : high) = mu;
-  }
-  r.least = low;
-  const double normal_least = r.a0 - r.a1 * r.least, product_least = r.least * (r.t1 * r.least - r.t0);
-  r.level_least = (1 + product_least * (1 / normal_least + r.potential_zero)) / normal_least;
-}
-
-// Returns a level that no loss is below: it falls with eta below mu_c, where the least one is.
-// @param s_upper  s at the largest eta
-double least_level(const Row& r, double s_upper) {
-  double least = 0;
-  constexpr int steps = 16;
-  for (int k = 0; k < steps; ++k) {
-    const double mu = r.sticking * k / steps, normal = r.a0 - r.a1 * mu, ratio = mu * (r.t1 * mu - r.t0) / normal;
-    const double more = 1 + r.upper;
-    least = std::min(least, more * ((1 - r.upper + more * ratio) / normal + r.kappa * s_upper * ratio));
-  }
-  return least - 0.01;  // what steps of mu may miss
-}
-
-Rules rules_of(const Row& r, double restitution_sd, double friction_sd) {
+Rules rules_of(const PublishedRow& r, double restitution_sd, double friction_sd) {
   // The curve bends by so many sds over one sd of eta: d^2 mu/d eta^2 is about 0.6 on it.
   const double bend = 0.6 * restitution_sd * restitution_sd / friction_sd;
   // Where eta = 0 meets the least loss, below mu_c, |grad g| is small and the curve turns sharply.
@@ -585,7 +424,7 @@ double PublishedDensity::slowest() const {
 
 double PublishedDensity::operator()(double state, std::span<const double> next, std::span<double> density) const {
   if (next.size() != density.size()) throw std::invalid_argument("density: spans of different sizes");
-  Row r{};
+  PublishedRow r{};
   r.a0 = a0_;
   r.a1 = a1_;
   r.t0 = t0_;

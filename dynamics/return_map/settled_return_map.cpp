@@ -10,6 +10,8 @@
 #include <numbers>
 #include <stdexcept>
 
+#include "dynamics/settled/settled_roll.h"
+
 namespace metastable::dynamics {
 namespace {
 

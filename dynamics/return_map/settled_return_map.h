@@ -16,6 +16,8 @@
 
 namespace metastable::dynamics {
 
+class SettledRoll;
+
 /// Maps landings of the law `settled` under random (eta, mu), with the phases of WheelMap: one for equal legs, else one
 /// a leg. Every landing starts from a standing foot: (leg, omega-) is taken for the whole state (steady steps touch an
 /// unsettled foot in 0 to 0.1 % of all cases; "foot unsettled" counts them). Rest is mu < mu_r(omega-, eta), so that

@@ -9,6 +9,8 @@
 #include <limits>
 #include <stdexcept>
 
+#include "dynamics/settled/settled_roll.h"
+
 namespace metastable::dynamics {
 namespace {
 

@@ -213,7 +213,15 @@ std::shared_ptr<const SettledMap> SettledMap::of(const SettledWheel& wheel, cons
       std::rotate(kept.begin(), found, found + 1);
       const Built built = kept.front().built;
       lock.unlock();
-      return built.get();  // may still be built by another thread
+      try {
+        return built.get();  // may still be built by another thread
+      } catch (const TableTooLong&) {
+        throw;
+      } catch (const std::invalid_argument&) {
+        throw;
+      } catch (...) {  // what ended the other caller's work does not end this one's
+        return of(wheel, options);
+      }
     }
     kept.push_front({wheel, options, promise.get_future().share()});
     kept.front().options.executor = nullptr;
@@ -234,9 +242,11 @@ std::shared_ptr<const SettledMap> SettledMap::of(const SettledWheel& wheel, cons
     promise.set_value(map);
     return map;
   } catch (...) {
+    {
+      const std::lock_guard lock(mutex);
+      std::erase_if(kept, is_it);
+    }
     promise.set_exception(std::current_exception());
-    const std::lock_guard lock(mutex);
-    std::erase_if(kept, is_it);
     throw;
   }
 }

@@ -8,7 +8,7 @@
 #include <string>
 
 #include "dynamics/laboratory/laboratory.h"
-#include "dynamics/settled/settled_motion.h"
+#include "dynamics/settled/settled_roll.h"
 #include "tests/dynamics/support.h"
 
 namespace metastable::dynamics::test {

@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "dynamics/return_map/trials.h"
+#include "dynamics/settled/settled_roll.h"
 #include "tests/dynamics/settled_tables.h"
 #include "tests/dynamics/support.h"
 

@@ -9,6 +9,7 @@
 #include <random>
 #include <string>
 
+#include "dynamics/settled/settled_roll.h"
 #include "dynamics/wheel/plastic_law.h"
 #include "tests/dynamics/support.h"
 
