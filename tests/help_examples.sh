@@ -1,8 +1,10 @@
 #!/usr/bin/env bash
-# The examples of --help run as they are pasted, in one folder in the order of the commands; what several commands show,
-# as the experiment folder to try, runs once.
+# The examples of --help run as they are pasted, in one folder in the order of the commands. An example runs once, whatever
+# number of commands shows it; not at all where another one of its command is the same with --out, or where a page of the
+# documentation runs it and no later example needs its files.
 # help_examples.sh FOLDER COMMAND...; FOLDER is where the program is.
 set -u
+pages=$(realpath "$(dirname -- "${BASH_SOURCE[0]}")/..")
 PATH=$(realpath "$1"):$PATH
 shift
 folder=$(mktemp -d)
@@ -10,18 +12,28 @@ trap 'rm -r "$folder"' EXIT
 cd "$folder" || exit
 failed=0
 declare -A ran
+
+shown_on_a_page() {  # arguments: an example
+  [[ $1 =~ ^metastable\ (steps|compare|sweep|solve)\  ]] &&
+    grep -qxF -- "\$ $1" "$pages"/README.md "$pages"/reports/site/*.md
+}
+
 for command in "$@"; do
-  shown=0
+  lines=()
   while read line; do  # without -r: lines that end with a backslash are joined
-    shown=1
+    lines+=("$line")
+  done < <(metastable "$command" --help | sed -n '/^Examples$/,/^$/{//d;s/ *# .*//;p}')
+  for line in "${lines[@]}"; do
     [[ -z ${ran[$line]:-} ]] || continue
     ran[$line]=1
+    [[ $(printf '%s\n' "${lines[@]}") != *"$line --out "* ]] || continue
+    ! shown_on_a_page "$line" || continue
     if ! said=$(bash -eu -c "$line" 2>&1 >/dev/null </dev/null); then
       printf 'an example of metastable %s --help fails: %s\n%s\n' "$command" "$line" "$said"
       failed=1
     fi
-  done < <(metastable "$command" --help | sed -n '/^Examples$/,/^$/{//d;s/ *# .*//;p}')
-  if [[ $shown == 0 ]]; then
+  done
+  if ((${#lines[@]} == 0)); then
     printf 'metastable %s --help shows no example\n' "$command"
     failed=1
   fi

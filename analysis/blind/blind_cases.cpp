@@ -121,11 +121,11 @@ PowerDesign draw_design(BlindTruth& truth, BlindDice& dice) {
   base.friction = truth.friction;
   PowerDesign design;
   design.conditions = draw_conditions(base, dice);
-  design.reality.sensor_noise = truth.noise = dice.uniform(0.003, 0.02);
-  design.reality.shuffled = dice.chance(0.5);
-  design.reality.flight = false;  // the models know no flight: it would be an effect of its own
-  design.reality.seed = truth.seed;
-  design.reality.threads = 1;
+  design.laboratory.sensor_noise = truth.noise = dice.uniform(0.003, 0.02);
+  design.laboratory.shuffled = dice.chance(0.5);
+  design.laboratory.flight = false;  // the models know no flight: it would be an effect of its own
+  design.laboratory.seed = truth.seed;
+  design.laboratory.threads = 1;
   return design;
 }
 
@@ -137,7 +137,7 @@ void size_outside(const BlindPlan& plan, double target, const Power& power, Blin
   // Beside effects of the catalogue it is half as strong to twice as strong as each of them.
   const double of_outside = plan.effects.empty() ? target : target * std::exp2(dice.uniform(-1, 1));
   const auto power_of = [&](double size) {
-    design.reality.outside = {{outside.id, size}};
+    design.laboratory.outside = {{outside.id, size}};
     return power(design, {});
   };
   // Twice the size is four times the power: 0.4 of the range stands for 2x where no likelihood says so.
@@ -146,7 +146,7 @@ void size_outside(const BlindPlan& plan, double target, const Power& power, Blin
                               : 0.2 * outside.upper * plan.strength * dice.uniform(0.85, 1.15);
   if (weighed) truth.power += power_of(size);
   truth.outside = {outside.id, size};
-  design.reality.outside = {*truth.outside};
+  design.laboratory.outside = {*truth.outside};
 }
 
 // Draws what the modeller states: the truth, or something near it. Nobody states the shape of the noise.
@@ -278,9 +278,9 @@ BlindCase blind_case(const BlindPlan& plan, int number, std::uint64_t seed, cons
 
   FolderOptions folder = draw_statement(plan, truth, dice);
   folder.dropped = design.dropped;
-  design.reality.restitution_skewness = truth.skewness;
-  design.reality.effects = truth.effects;
-  const dynamics::LaboratorySetup setup = laboratory_setup(design.conditions, design.reality);
+  design.laboratory.restitution_skewness = truth.skewness;
+  design.laboratory.effects = truth.effects;
+  const dynamics::LaboratorySetup setup = laboratory_setup(design.conditions, design.laboratory);
   made.files = laboratory_files(design.conditions, setup, run_laboratory(setup, 1), folder);
   if (plan.kind == BlindKind::left_out) {
     truth.left_out = plan.effects;

@@ -50,17 +50,17 @@ double expected_power(const PowerDesign& design, const std::vector<dynamics::Eff
   if (replicates < 1) throw std::invalid_argument(fmt::format("replicates: {} is below 1", replicates));
   double sum = 0;
   for (int r = 0; r < replicates; ++r) {
-    LaboratoryOptions reality = design.reality;
-    reality.effects = effects;
-    reality.seed = design.reality.seed + 0x9e3779b97f4a7c15ULL * static_cast<std::uint64_t>(r + 1);
-    const dynamics::LaboratorySetup setup = laboratory_setup(design.conditions, reality);
+    LaboratoryOptions laboratory = design.laboratory;
+    laboratory.effects = effects;
+    laboratory.seed = design.laboratory.seed + 0x9e3779b97f4a7c15ULL * static_cast<std::uint64_t>(r + 1);
+    const dynamics::LaboratorySetup setup = laboratory_setup(design.conditions, laboratory);
     const LaboratoryFiles made =
         laboratory_files(design.conditions, setup, run_laboratory(setup, 1), {.dropped = design.dropped});
     const Experiment experiment = parse_experiment(source_of(made.files, "laboratory"));
     const Setting& stated = design.conditions.front().setting;
     const dynamics::NominalValues contact = stated_values(stated.restitution, stated.friction, stated.wheel.leg_length);
-    if (!reality.outside.empty()) {
-      sum += outside_power(experiment, contact, reality.outside.front());
+    if (!laboratory.outside.empty()) {
+      sum += outside_power(experiment, contact, laboratory.outside.front());
       continue;
     }
     const auto model = wheel_transitions(experiment);

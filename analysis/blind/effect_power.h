@@ -13,7 +13,7 @@ namespace metastable::analysis {
 /// Describes an experiment in the laboratory, with what its folder tells.
 struct PowerDesign {
   std::vector<LaboratoryCondition> conditions;  ///< stated; contact as it truly is
-  LaboratoryOptions reality;                    ///< without effects of the catalogue
+  LaboratoryOptions laboratory;                 ///< without effects of the catalogue
   std::vector<std::string> dropped;
 };
 
@@ -26,8 +26,8 @@ EffectTerm fitted_term(const TransitionModel& model, const dynamics::Effect& eff
 std::vector<double> true_nuisances(const TransitionModel& model, const dynamics::NominalValues& contact);
 
 /// Returns the mean over `replicates` laboratory experiments with the effects of 2 log(likelihood with them / without),
-/// true contact known to both: about the effects' own noncentrality. Seeds follow design.reality.seed, apart from the
-/// case's own. A design with an effect outside the catalogue is weighed by that one alone, and takes no others.
+/// true contact known to both: about the effects' own noncentrality. Seeds follow design.laboratory.seed, apart from
+/// the case's own. A design with an effect outside the catalogue is weighed by that one alone, and takes no others.
 /// @throws std::invalid_argument for replicates < 1, and for an outside effect that cannot be weighed
 double expected_power(const PowerDesign& design, const std::vector<dynamics::Effect>& effects, int replicates);
 

@@ -61,6 +61,11 @@ std::vector<WeighedFit> telling(const std::vector<const RankedCause*>& ordered, 
   return fits;
 }
 
+// Returns the place that was asked about, if one was.
+Elsewhere asked_elsewhere(const TransitionModel& model, const DiagnosisOptions& options) {
+  return options.elsewhere.empty() ? Elsewhere{} : model.elsewhere(options.elsewhere);
+}
+
 // Returns the one or two effects that an entry of the options names.
 std::vector<std::string> effects_of(const std::string& entry) {
   const auto plus = entry.find('+');
@@ -74,7 +79,6 @@ std::vector<std::string> effects_of(const std::string& entry) {
 void check(const TransitionModel& model, const DiagnosisOptions& options) {
   if (options.draws < 200) throw std::invalid_argument(fmt::format("draws: {} is below 200", options.draws));
   if (options.folds < 2) throw std::invalid_argument(fmt::format("folds: {} is below 2", options.folds));
-  if (!options.elsewhere.empty()) model.elsewhere(options.elsewhere);
   if (!(options.level > 0 && options.level < 0.5))
     throw std::invalid_argument(fmt::format("level: {} is outside (0, 0.5)", options.level));
   const std::vector<std::string> known = model.effect_ids();
@@ -221,7 +225,7 @@ Fitted fit_models(const TransitionModel& model, const std::vector<const Candidat
     fitted.recalibrated = *std::move(other);
     fitted.ranking = rank();
   }
-  // What the data hold no information on is not decided, whatever its evidence.
+  // An effect on which the data hold no information is not decided, whatever its evidence.
   const std::vector<Detectability> visible = detectability(fitted.ranking.scan, candidates, options.rules);
   std::vector<RankedCause>& singles = fitted.ranking.singles;
   for (std::size_t i = 0; i < singles.size(); ++i)
@@ -314,7 +318,7 @@ HeldOutGap hold_out(const TransitionModel& model, const Fitted& fitted, const Hy
 
 // Says which effects cause the gap, with what probability.
 std::pair<Verdict, Diagnosis::Causes> name_causes(const TransitionModel& model, const Fitted& fitted,
-                                                  Hypotheses hypotheses, Chosen chosen, std::size_t candidates,
+                                                  const Hypotheses& hypotheses, Chosen chosen, std::size_t candidates,
                                                   const Diagnosis& d, const Tested& tested,
                                                   const DiagnosisOptions& options, const Progress& progress) {
   Diagnosis::Causes causes;
@@ -327,10 +331,10 @@ std::pair<Verdict, Diagnosis::Causes> name_causes(const TransitionModel& model, 
                       probabilities_beside_unnamed(model, fitted.ranking, *hypotheses.best(), fitted.recalibrated,
                                                    chosen.supposed.front().facets, candidates, options,
                                                    [&] { progress(0.86, "what stands beside the unnamed"); }),
-                      chosen.unnamed.of_beside(), d.rules);
+                      chosen.unnamed.of_beside(), probabilities.ranked, d.rules);
   if (!named.at_work.empty()) causes.unnamed_facets = facets_by_probability(chosen, named.p_unnamed, d.rules);
   causes.ranked = std::move(probabilities.ranked);
-  causes.not_decided = std::move(hypotheses.not_decided);
+  causes.not_decided = hypotheses.not_decided;
   causes.unnamed = std::move(chosen.supposed);
   causes.set = std::move(named.set);
   causes.alike = std::move(named.alike);
@@ -347,7 +351,7 @@ std::pair<Verdict, Diagnosis::Causes> name_causes(const TransitionModel& model, 
 
 // Puts the answer together from what each stage says.
 Diagnosis answer(const TransitionModel& model, const Fitted& fitted, const std::vector<const Candidate*>& candidates,
-                 const DiagnosisOptions& options, const Progress& progress) {
+                 const Elsewhere& elsewhere, const DiagnosisOptions& options, const Progress& progress) {
   Diagnosis d;
   d.rules = options.rules;
   d.data = described_data(model);
@@ -358,10 +362,9 @@ Diagnosis answer(const TransitionModel& model, const Fitted& fitted, const std::
   const Tested tested{d.gap.p_value < options.level, d.gap.p_recalibration < options.level};
 
   progress(0.68, "what is left");
-  Hypotheses ranked = hypotheses(model, fitted.ranking);
+  const Hypotheses ranked = hypotheses(model, fitted.ranking);
   const RankedCause* best = ranked.best();
-  const std::vector<const RankedCause*> ordered = ranked.ordered;
-  const RankedCause* second = ordered.size() > 1 ? ordered[1] : nullptr;
+  const RankedCause* second = ranked.ordered.size() > 1 ? ranked.ordered[1] : nullptr;
   Chosen chosen = best_hypothesis(model, fitted, ranked, std::move(found), tested.gap, options);
   const Fit& cause = *chosen.fit;
   d.gap.left = chosen.left;
@@ -370,7 +373,7 @@ Diagnosis answer(const TransitionModel& model, const Fitted& fitted, const std::
   d.shrinkage.measures = held_out.measures;
   if (tested.gap && trials_to_explain(d.data)) chosen.unnamed.alone = std::max(chosen.unnamed.alone, d.rules.even_odds);
   std::tie(d.verdict, d.causes) =
-      name_causes(model, fitted, std::move(ranked), std::move(chosen), candidates.size(), d, tested, options, progress);
+      name_causes(model, fitted, ranked, std::move(chosen), candidates.size(), d, tested, options, progress);
   if (best && !d.shrinkage.measures.empty() && d.shrinkage.measures.front().closed)
     add_closed_shares(d.causes.at_work, model, fitted.ranking, *best, fitted.given, fitted.recalibrated, held_out.gap,
                       options, [&] { progress(0.86, "what each effect closes"); });
@@ -381,8 +384,8 @@ Diagnosis answer(const TransitionModel& model, const Fitted& fitted, const std::
     d.shrinkage.measures.push_back(rest_shrinkage(at_risk, rests, d.shrinkage.steps));
   add_machine_steps(
       d, model, {&fitted.recalibrated, 1},
-      is_gap(d.verdict) && &cause != &fitted.recalibrated ? telling(ordered, d) : std::vector<WeighedFit>{}, options,
-      [&] { progress(0.9, "steps before failure"); });
+      is_gap(d.verdict) && &cause != &fitted.recalibrated ? telling(ranked.ordered, d) : std::vector<WeighedFit>{},
+      elsewhere, options, [&] { progress(0.9, "steps before failure"); });
   d.shrinkage.profile = collision_profile(model, fitted.given.nuisance, cause, options.seed);
   progress(0.93, "what could not be seen");
   d.limits.missing = missing_columns(model, fitted.recalibrated, candidates, d.rules, options.threads, options.seed);
@@ -427,7 +430,8 @@ Diagnosis diagnose(const TransitionModel& model, const DiagnosisOptions& options
   const std::vector<const Candidate*> candidates = wanted(model, options.catalogue);
   const Progress progress = told_to(options);
   progress(0, "the model as given");
-  return answer(model, fit_models(model, candidates, options, progress), candidates, options, progress);
+  const Elsewhere elsewhere = asked_elsewhere(model, options);
+  return answer(model, fit_models(model, candidates, options, progress), candidates, elsewhere, options, progress);
 }
 
 std::vector<Diagnosis> diagnose_each(const TransitionModel& model, const DiagnosisOptions& options,
@@ -435,6 +439,7 @@ std::vector<Diagnosis> diagnose_each(const TransitionModel& model, const Diagnos
   check(model, options);
   const std::vector<const Candidate*> candidates = wanted(model, options.catalogue);
   const Progress progress = told_to(options);
+  const Elsewhere elsewhere = asked_elsewhere(model, options);
   std::vector<std::pair<Rules, Fitted>> known;
   std::vector<Diagnosis> all;
   for (const Rules& these : rules) {
@@ -442,7 +447,7 @@ std::vector<Diagnosis> diagnose_each(const TransitionModel& model, const Diagnos
     with.rules = these;
     auto same = std::ranges::find_if(known, [&](const auto& one) { return one.first.fits_as(these); });
     if (same == known.end()) same = known.insert(same, {these, fit_models(model, candidates, with, progress)});
-    all.push_back(answer(model, same->second, candidates, with, progress));
+    all.push_back(answer(model, same->second, candidates, elsewhere, with, progress));
   }
   return all;
 }

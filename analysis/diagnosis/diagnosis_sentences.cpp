@@ -232,10 +232,10 @@ void say_what_closes(std::vector<std::string>& s, const Diagnosis& d) {
 void say_machine_steps(std::vector<std::string>& s, const Diagnosis& d) {
   for (const MachineSteps& machine : d.shrinkage.steps.machine) {
     if (!(machine.steps.lower > 0)) continue;
-    const std::string where = &machine == &d.shrinkage.steps.machine.front() ? "" : " " + machine.where;
+    const std::string where = machine.where.empty() ? "" : " " + machine.where;
     if (machine.at_least) {
-      s.push_back(fmt::format("This machine takes at least {:.2g} {}s before failure{} (95 %).", machine.steps.lower,
-                              d.data.step_name, where));
+      s.push_back(fmt::format("This machine takes at least {} {}s before failure{} (95 %).",
+                              format_number(machine.steps.lower, NumberFormat::general, 2), d.data.step_name, where));
       continue;
     }
     const DecimalEstimate steps = to_decimal(machine.steps, NumberFormat::general, 3);

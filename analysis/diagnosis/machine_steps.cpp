@@ -7,7 +7,6 @@
 #include <boost/math/distributions/chi_squared.hpp>
 #include <cmath>
 #include <limits>
-#include <mutex>
 #include <stdexcept>
 
 #include "analysis/statistics/interval_95.h"
@@ -21,9 +20,10 @@ namespace {
 constexpr double infinity = std::numeric_limits<double>::infinity();
 // Draws of what stands for the machine, and of the recalibrated model: fewer save time.
 constexpr int draws_of_machine = 16, draws_of_recalibrated = 10;
-constexpr int error_nodes = 241;   // of the grid of a model's error,
-constexpr double of_no_say = 3;    // sd of the logarithm
-constexpr double error_reach = 4;  //   out to so many sds
+constexpr double of_no_say = 3;  // sd of the logarithm
+// The grid of a model's error has so many nodes, out to so many sds on either side.
+constexpr int error_nodes = 241;
+constexpr double error_reach = 4;
 
 // Says whether the fit's information holds all of its parameters.
 bool has_information(const Fit& fit) {
@@ -86,7 +86,7 @@ double weighted_quantile(const std::vector<std::pair<double, double>>& sorted, d
   for (const auto& [value, weight] : sorted) all += weight;
   for (const auto& [value, weight] : sorted) {
     sum += weight;
-    if (sum >= share * all) return value;
+    if (sum >= share * all * (1 - 1e-9)) return value;  // equal weights reach a share up to rounding
   }
   return sorted.back().first;
 }
@@ -132,19 +132,15 @@ std::vector<double> drawn_steps(const TransitionModel& model, const TransitionMo
   double all = 0;
   for (const WeighedFit& one : fits) all += one.weight;
   std::vector<double> steps(static_cast<std::size_t>(draws));
-  std::mutex speaking;
-  markov::parallel_for(steps.size(), threads, [&](std::size_t i) {
-    {
-      const std::lock_guard lock(speaking);
-      heartbeat();
-    }
+  const auto drawn = [&](std::size_t i) {
     // Each fit has its share of the draws, in their order.
     const double place = (static_cast<double>(i) + 0.5) / static_cast<double>(draws) * all;
     std::size_t k = 0;
     for (double sum = fits[0].weight; sum < place && k + 1 < fits.size(); sum += fits[k].weight) ++k;
-    const Fit drawn = drawn_fit(model, *fits[k].fit, seed, i);
-    steps[i] = at.expected_steps(drawn.nuisance, drawn.terms, seed + 1 + i);
-  });
+    const Fit fit = drawn_fit(model, *fits[k].fit, seed, i);
+    steps[i] = at.expected_steps(fit.nuisance, fit.terms, seed + 1 + i);
+  };
+  markov::parallel_for(steps.size(), threads, drawn, [&](double) { heartbeat(); });
   return steps;
 }
 
@@ -179,7 +175,7 @@ Estimate joined_steps(const std::vector<double>& here, const std::vector<double>
       weight[static_cast<std::size_t>(k)] = std::exp(std::min(600.0, gained - 0.5 * z * z));
       sum += weight[static_cast<std::size_t>(k)];
     }
-    // How the error differs elsewhere grows with what the model says that is different there.
+    // The error differs elsewhere by more, the more the model says is different there.
     const double further = std::isfinite(there[i]) ? error.elsewhere * std::abs(std::log(there[i] / here[i])) : 0;
     for (int k = 0; k < error_nodes; ++k)
       for (const double more : {-1.0, 1.0})
@@ -197,7 +193,7 @@ Estimate joined_steps(const std::vector<double>& here, const std::vector<double>
 }
 
 void add_machine_steps(Diagnosis& d, const TransitionModel& model, const WeighedFit& recalibrated,
-                       const std::vector<WeighedFit>& fits, const DiagnosisOptions& options,
+                       const std::vector<WeighedFit>& fits, const Elsewhere& elsewhere, const DiagnosisOptions& options,
                        const std::function<void()>& heartbeat) {
   StepsBeforeFailure& s = d.shrinkage.steps;
   const std::vector<WeighedFit> plain{recalibrated};
@@ -210,18 +206,15 @@ void add_machine_steps(Diagnosis& d, const TransitionModel& model, const Weighed
   s.with_effect_90 = interval_of_draws(of_effects);
   const auto [at_risk, rests] = model.rests();
   const ModelError error = model_error(d);
-  const auto add = [&](std::string where, const std::vector<double>& there) {
-    MachineSteps machine{std::move(where), joined_steps(of_effects, there, error, at_risk, rests), false};
+  const auto add = [&](const std::string& where, const std::vector<double>& there) {
+    MachineSteps machine{where, joined_steps(of_effects, there, error, at_risk, rests), false};
     machine.at_least = !std::isfinite(machine.steps.upper);
     // A model that never fails, and trials that did not: so many steps are seen as no failure excludes.
-    if (machine.at_least && &there == &of_effects && !std::isfinite(machine.steps.lower))
-      machine.steps.lower = s.observed_lower;
+    if (where.empty() && !std::isfinite(machine.steps.lower)) machine.steps.lower = s.observed_lower;
     if (std::isfinite(machine.steps.lower) && machine.steps.lower > 0) s.machine.push_back(std::move(machine));
   };
-  add("as measured", of_effects);
-  if (options.elsewhere.empty()) return;
-  auto [words, there] = model.elsewhere(options.elsewhere);
-  add(std::move(words), draw(*there, fits.empty() ? plain : fits, draws_of_machine));
+  add("", of_effects);
+  if (elsewhere.second) add(elsewhere.first, draw(*elsewhere.second, fits.empty() ? plain : fits, draws_of_machine));
 }
 
 }  // namespace metastable::analysis

@@ -3,6 +3,8 @@
 
 #include <cstdint>
 #include <functional>
+#include <memory>
+#include <string>
 #include <utility>
 #include <vector>
 
@@ -16,6 +18,9 @@ struct WeighedFit {
   const Fit* fit = nullptr;
   double weight = 1;
 };
+
+/// The place that was asked about, in words, with its design; no design: none was.
+using Elsewhere = std::pair<std::string, std::unique_ptr<TransitionModel>>;
 
 /// Counts what was seen: rests among the collisions at risk, with exact 90 % limits of a Poisson mean.
 /// @param rests  TransitionModel::rests()
@@ -33,15 +38,15 @@ std::vector<double> drawn_steps(const TransitionModel& model, const TransitionMo
 /// rest; infinite ends where more than so many never do. @param draws  not empty
 Estimate interval_of_draws(const std::vector<double>& draws);
 
-/// What a model lacks, in the logarithm of the expected steps: the sd of its error here, and of how that error differs
-/// elsewhere.
+/// The error of a model in the logarithm of the expected steps: its sd where trials were counted, and the sd by which
+/// it differs elsewhere, for a change of the steps by a factor of e.
 struct ModelError {
   double here = 0, elsewhere = 0;
 };
 
 /// Joins the draws of a model with the count, by Bayes's rule on a grid of the model's error: that multiplies what the
-/// model says here and there alike. The count corrects that error alone: what it says of the parameters the fits know,
-/// whose likelihood holds every rest.
+/// model says here and there alike. The count corrects the model's error alone: the likelihood of the fits already
+/// holds every rest, so that their parameters are not weighed by it again.
 /// @param here  draws for the experiment that was counted  @param there  for the one asked about, draw by draw
 /// @param at_risk, rests  at_risk 0: nothing was counted
 Estimate joined_steps(const std::vector<double>& here, const std::vector<double>& there, const ModelError& error,
@@ -52,7 +57,7 @@ Estimate joined_steps(const std::vector<double>& here, const std::vector<double>
 /// @param fits  the recalibrated model, then those of the hypotheses with their probabilities (none: that model alone)
 /// @param d  with its verdict, its held-out measures and the steps observed and expected
 void add_machine_steps(Diagnosis& d, const TransitionModel& model, const WeighedFit& recalibrated,
-                       const std::vector<WeighedFit>& fits, const DiagnosisOptions& options,
+                       const std::vector<WeighedFit>& fits, const Elsewhere& elsewhere, const DiagnosisOptions& options,
                        const std::function<void()>& heartbeat);
 
 }  // namespace metastable::analysis

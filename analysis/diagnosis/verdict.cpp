@@ -1,5 +1,7 @@
 #include "analysis/diagnosis/verdict.h"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <cmath>
 #include <iterator>
@@ -260,7 +262,8 @@ Named give_verdict(const Probabilities& probabilities, const Odds& unnamed, cons
   return named;
 }
 
-Named corrected(Named named, const std::map<std::string, double>& beside, double unnamed, const Rules& rules) {
+Named corrected(Named named, const std::map<std::string, double>& beside, double unnamed,
+                const std::vector<Cause>& ranked, const Rules& rules) {
   const auto is_there = [&](const AtWork& one) { return one.probability >= rules.least_at_work; };
   const auto before = std::ranges::count_if(named.at_work, is_there);
   for (AtWork& one : named.at_work)
@@ -271,10 +274,12 @@ Named corrected(Named named, const std::map<std::string, double>& beside, double
   const auto after = std::ranges::count_if(named.at_work, is_there);
   if (after == before) return named;
   if (after > 0) {  // the set is what is left of it
-    std::string name;
+    std::vector<std::string> effects;
     for (const AtWork& one : named.at_work)
-      if (is_there(one)) name += (name.empty() ? "" : "+") + one.effects.front();
-    named.set = {name};
+      if (is_there(one)) effects.push_back(one.effects.front());
+    const auto cause = std::ranges::find_if(
+        ranked, [&](const Cause& one) { return std::ranges::is_permutation(one.effects, effects); });
+    named.set = {cause == ranked.end() ? fmt::format("{}", fmt::join(effects, "+")) : cause->name()};
     named.alike.clear();
     return named;
   }

@@ -62,7 +62,7 @@ Chosen choose(const TransitionModel& model, const CauseRanking& ranking, const s
 bool leaves_gap_held_out(const Shrinkage& log_score, const Diagnosis::Data& data, double bent, double by_itself,
                          const Rules& rules);
 
-/// What the tests say.
+/// The outcome of the tests for a gap.
 struct Tested {
   bool gap = false;           ///< after recalibration
   bool recalibrates = false;  ///< by a recalibration that gains more than chance
@@ -99,7 +99,8 @@ Named give_verdict(const Probabilities& probabilities, const Odds& unnamed, cons
 /// Corrects the probabilities of a partly explained gap by what each effect gains beside the unnamed: an effect that
 /// only takes its shape is not at work, and where none is left the gap is unexplained.
 /// @param beside  probabilities_beside_unnamed(); effects that it lacks stay as they are
-/// @param unnamed  Odds::of_beside()
-Named corrected(Named named, const std::map<std::string, double>& beside, double unnamed, const Rules& rules);
+/// @param unnamed  Odds::of_beside()  @param ranked  Probabilities::ranked
+Named corrected(Named named, const std::map<std::string, double>& beside, double unnamed,
+                const std::vector<Cause>& ranked, const Rules& rules);
 
 }  // namespace metastable::analysis

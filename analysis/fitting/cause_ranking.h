@@ -22,7 +22,8 @@ struct RankedCause {
   /// sought; of several that of what the last one earned beyond the others.
   double p_value = 1;
   double evidence = 0;  ///< log Bayes factor against the recalibrated model, prior odds of several effects included
-  /// Of several effects: its gain over what they gain alone, beside what each hides of the others.
+  /// The gain of several effects over the sum of what they gain alone, where that sum counts what each hides of the
+  /// others by its scatter; 1 for one effect.
   double together = 1;
   std::string not_decided;  ///< why, where the data cannot tell or the fit did not converge
   bool candidate_undecided() const { return !terms[0].candidate->undecidable.empty(); }

@@ -95,7 +95,7 @@ void fit_pairs(const RankingProblem& problem, const SingleEffects& singles, cons
   }
 }
 
-// What a pair gains beyond its first effect may be a better optimum of that effect, which the pair's fit came upon.
+// A pair may gain beyond its first effect because its fit came upon a better optimum of that effect.
 void refit_from_pairs(const RankingProblem& problem, EffectPairs& ranked, ScansBeside& beside) {
   SingleEffects& singles = ranked.singles;
   std::vector<const RankedCause*> gaining;
@@ -160,8 +160,8 @@ void refine_paired(const RankingProblem& problem, EffectPairs& ranked, ScansBesi
   fit_pairs(problem, ranked.singles, tries, ranked.pairs);
 }
 
-// Beside one effect of the best pair others may act like its second one, as torques do: all that promise about as much
-// are fitted, so that a set names them.
+// Other effects may act like the second one of the best pair, as torques do: all that promise about as much beside the
+// first are fitted, so that the set names them.
 void complete_pairs(const RankingProblem& problem, EffectPairs& ranked, ScansBeside& beside) {
   const RankedCause* best = near_best_pair(ranked);
   if (!best) return;

@@ -2,10 +2,12 @@
 
 #include <algorithm>
 #include <cmath>
+#include <iterator>
 #include <optional>
 #include <utility>
 
 #include "analysis/fitting/bayes_factor.h"
+#include "analysis/statistics/falling_order.h"
 #include "dynamics/numerics/truncated_normal.h"
 #include "markov/parallel.h"
 
@@ -88,7 +90,8 @@ double log_prior_of_one_more(const RankingProblem& problem, std::size_t size) {
 std::vector<ScannedEffect> promising_beside(const RankingProblem& problem, const EffectScan& scan,
                                             const RankedCause& base) {
   std::vector<ScannedEffect> worth;
-  std::vector<std::pair<double, const ScannedEffect*>> promising;
+  std::vector<double> promises;
+  std::vector<const ScannedEffect*> promising;
   const double prior = log_prior_of_one_more(problem, base.terms.size() + 1);
   for (const ScannedEffect& effect : scan.effects) {
     const double promised = evidence_of(effect, effect.gain[effect.best], problem.rules);
@@ -97,11 +100,11 @@ std::vector<ScannedEffect> promising_beside(const RankingProblem& problem, const
     if (knows_start(problem.model, terms))
       worth.push_back(effect);
     else if (promised + prior > least_more_evidence)
-      promising.emplace_back(promised, &effect);
+      promises.push_back(promised), promising.push_back(&effect);
   }
-  std::sort(promising.begin(), promising.end(), [](const auto& a, const auto& b) { return a.first > b.first; });
-  for (std::size_t k = 0; k < std::min(problem.effort.most_partners, promising.size()); ++k)
-    worth.push_back(*promising[k].second);
+  const std::vector<std::size_t> order = falling_order(promises);
+  for (std::size_t k = 0; k < std::min(problem.effort.most_partners, order.size()); ++k)
+    worth.push_back(*promising[order[k]]);
   return worth;
 }
 

@@ -1,5 +1,5 @@
 #pragma once
-// What every stage of a ranking of causes works on.
+// The inputs that all stages of a ranking of causes share.
 
 #include <algorithm>
 #include <cstddef>

@@ -40,17 +40,17 @@ struct Rules {
 
   // Tests for a gap: shares of the level, whose sum keeps it.
 
-  /// Of the best single effect. Derivation: tests of a named effect have the most power, so that they get what the
-  /// tests of unnamed gaps leave.
+  /// Share of the test of the best single effect. Derivation: tests of a named effect have the most power, so that they
+  /// get what the tests of unnamed gaps leave.
   double share_for_effects = 0.8;
-  double share_for_facets = 0.05;      ///< Of all cells of one facet together. Convention.
-  double share_for_variations = 0.05;  ///< Of what varies without a name. Convention.
-  double share_for_cells = 0.1;        ///< Of one cell of the map. Convention.
-  /// Of pairs whose effects hide one another, on top of the level. Measurement: of 93 folders of own data none raises
-  /// an alarm (tests/benchmarks/own_data.py), as the look at all pairs is paid for in full.
+  double share_for_facets = 0.05;      ///< Share of the test of all cells of one facet together. Convention.
+  double share_for_variations = 0.05;  ///< Share of the test of variations without a name. Convention.
+  double share_for_cells = 0.1;        ///< Share of the test of one cell of the map. Convention.
+  /// Share of the test of pairs whose effects hide one another, on top of the level. Measurement: of 93 folders of own
+  /// data none raises an alarm (tests/benchmarks/own_data.py), as the look at all pairs is paid for in full.
   double share_for_pairs = 0.1;
 
-  // What the best hypothesis leaves, before something without a name is supposed.
+  // Limits of what the best hypothesis may leave before something without a name is supposed.
 
   /// P-value of the map that it leaves. Convention: 0.3 %, three standard deviations.
   double remaining_level = 0.003;
@@ -60,8 +60,8 @@ struct Rules {
   /// Held-out gap that counts as one [nats a collision]. Convention: a twentieth of a nat is what a normal error of a
   /// third of its sd does.
   double least_remaining = 0.05;
-  /// Or that no draw of the trials takes away [nats, all collisions]. Derivation: 2 Delta log likelihood of 12, 3.5
-  /// standard deviations.
+  /// Held-out gap that counts as one where every draw of the trials shows it [nats, all collisions]. Derivation: 2
+  /// Delta log likelihood of 12, 3.5 standard deviations.
   double least_remaining_in_all = 6;
   /// Squared model errors of the gap as given that count as none held out. Derivation: an error of form of e leaves e^2
   /// of an effect's gain, and one in each of about six of the aspects and facets that it shows in.

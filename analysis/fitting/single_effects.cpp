@@ -6,6 +6,7 @@
 #include <utility>
 
 #include "analysis/fitting/bayes_factor.h"
+#include "analysis/statistics/falling_order.h"
 #include "dynamics/numerics/truncated_normal.h"
 #include "markov/parallel.h"
 
@@ -49,7 +50,7 @@ void fit_law(const RankingProblem& problem, const SingleEffects& singles, Ranked
   if (!cause.fit.converged && cause.fit.penalised - problem.recalibrated.penalised > law_hopeless)
     cause.fit = from(cause.fit.nuisance, std::min(more_law_steps, 4 * problem.effort.most_iterations));
   cause.gain = problem.gain(cause.fit);
-  // What is far below and hardly rises any more is decided against.
+  // A law that is far below and hardly rises any more is decided against.
   if (!cause.fit.converged && cause.gain > law_refuted) cause.not_decided = cause.fit.reason;
   cause.p_value = singles.p_value(cause.terms[0].candidate, cause.gain);
   cause.evidence = 0.5 * cause.gain;
@@ -71,7 +72,7 @@ RankedCause weighed_effect(const RankingProblem& problem, const SingleEffects& s
   }
   const ScannedEffect& scanned = *singles.scan.find(candidate);
   const double promised = scanned.gain[scanned.best];
-  // Where the model knows better starts than the scores, the scores do not decide.
+  // The scores do not decide where the model itself knows better starts.
   if (!problem.model.starts(std::vector{term_at(scanned, scanned.best)}).empty() ||
       (promised >= problem.effort.least_promise && promised >= promise_share * largest - promise_margin))
     return fitted_effect(problem, singles, scanned);
@@ -112,8 +113,8 @@ bool near_the_top(const SingleEffects& singles, const RankedCause& cause) {
   return cause.evidence >= refined_share * singles.top - refined_margin;
 }
 
-// What a recalibration did to take a large effect up may hold the effect's fit off its optimum, which then strains the
-// nuisances: the stated ones are a start, too.
+// A recalibration that took a large effect up may hold the effect's own fit off its optimum, so that the nuisances are
+// strained: fits start from the stated nuisances, too.
 void refit_from_stated(const RankingProblem& problem, SingleEffects& singles) {
   const std::vector<double> stated = nominal_values(problem.model);
   markov::parallel_for(singles.causes.size(), problem.threads, [&](std::size_t i) {
@@ -169,8 +170,11 @@ std::vector<std::size_t> strongest(const RankingProblem& problem, const SingleEf
   for (std::size_t i = 0; i < singles.causes.size(); ++i)
     if (singles.causes[i].evidence > leader_evidence && singles.causes[i].fitted() && wanted(singles.causes[i]))
       all.push_back(i);
-  std::sort(all.begin(), all.end(),
-            [&](std::size_t a, std::size_t b) { return singles.causes[a].evidence > singles.causes[b].evidence; });
+  std::vector<double> evidence;
+  for (const std::size_t i : all) evidence.push_back(singles.causes[i].evidence);
+  std::vector<std::size_t> ordered;
+  for (const std::size_t k : falling_order(evidence)) ordered.push_back(all[k]);
+  all = std::move(ordered);
   if (all.size() > problem.effort.most_leaders) all.resize(problem.effort.most_leaders);
   return all;
 }

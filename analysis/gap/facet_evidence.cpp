@@ -141,7 +141,7 @@ LeftInFacet judge(const Key& key, const Eigen::MatrixXd& dense, const Eigen::Vec
 
 std::vector<LeftInFacet> left_by_facet(const TransitionModel& model, const Fit& fit, const PhaseGain& forgiven,
                                        const Rules& rules) {
-  // Where the fit did not converge, what is left is mostly the fit's own.
+  // A fit that did not converge leaves mostly its own error.
   if (!fit.converged && fit.promised > most_promised) return {};
   Facets facets;
   MapColumns mapped = map_columns(model, fit);

@@ -28,7 +28,7 @@ struct Shrinkage {
 
 /// The expected steps of the machine itself: what its models leave open and what was counted, joined.
 struct MachineSteps {
-  std::string where;      ///< "as measured", or the place that was asked about
+  std::string where;      ///< the place that was asked about, as "on a slope of 8 deg"; "": as measured
   Estimate steps;         ///< 90 %
   bool at_least = false;  ///< neither the count nor the models bound them above: the lower end alone holds, with 95 %
 };
@@ -37,7 +37,7 @@ struct StepsBeforeFailure {
   double observed = 0, observed_lower = 0,
          observed_upper = 0;  ///< collisions at risk by rests, exact 90 %; 0: not known
   double baseline = 0, recalibrated = 0, with_effect = 0;
-  /// What the fitted parameters, and the hypotheses by their probability, leave open of the last two (90 %).
+  /// Intervals of the last two (90 %), which the fitted parameters and the hypotheses' probabilities leave open.
   std::optional<Estimate> recalibrated_90 = {}, with_effect_90 = {};
   std::vector<MachineSteps> machine = {};  ///< as measured; then the place that was asked about
 };

@@ -8,7 +8,7 @@
 
 #include "analysis/description/speed_profile.h"
 #include "dynamics/return_map/trials.h"
-#include "dynamics/settled/settled_motion.h"
+#include "dynamics/settled/settled_roll.h"
 
 namespace metastable::analysis {
 

@@ -29,10 +29,11 @@ class NotTabulated : public markov::ConvergenceError {
       : ConvergenceError("not known: law settled: " + why + "; simulate follows trials") {}
 };
 
-/// Says that what survives goes ever faster: there is no regime to tell numbers of.
-class RunsAway : public markov::ConvergenceError {
+/// Says that a machine goes ever faster, in all that survives or in one motion that is followed: there is no regime to
+/// tell numbers of.
+class WithoutRegime : public markov::ConvergenceError {
  public:
-  explicit RunsAway(const std::string& what) : ConvergenceError("not known: " + what) {}
+  explicit WithoutRegime(const std::string& what) : ConvergenceError("not known: " + what) {}
 };
 
 /// Survival starts at 1, does not rise, and sums to no more than the expected steps; every interval holds its value;

@@ -81,7 +81,7 @@ std::optional<Pilot> solve_pilot(const Problem& problem, const StudyOptions& opt
     const double beyond = markov::top_share(space, nu);
     if (reach > farthest_reach && beyond > without_end) {
       const markov::Grid& grid = space.grid(0);
-      throw RunsAway(fmt::format(
+      throw WithoutRegime(fmt::format(
           "survivors gain from step to step without end: {:.3g} % of them come to {} above {:.3g}{}, so that there is "
           "no metastable regime, and the expected steps are infinite or of no wheel that steps from foot to foot",
           100 * beyond, problem.observed, problem.observable(grid.lower(space.cells() - 1)), problem.observed_unit));

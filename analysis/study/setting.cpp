@@ -13,6 +13,7 @@
 #include "analysis/study/consistency.h"
 #include "dynamics/return_map/settled_return_map.h"
 #include "dynamics/return_map/trials.h"
+#include "dynamics/settled/settled_roll.h"
 #include "dynamics/wheel/ranges.h"
 #include "markov/parallel.h"
 
@@ -42,7 +43,11 @@ std::function<Run(double, int)> rolls(std::shared_ptr<const dynamics::SettledMot
     const double omega = std::max(std::sqrt(state), slowest_roll);
     return [motion, contact, roll = dynamics::SettledRoll(*motion, phase, omega, contact, contact), seconds = 0.0,
             metres = 0.0]() mutable -> std::optional<FollowedEvent> {
-      if (!roll.step().touched) return std::nullopt;
+      try {
+        if (!roll.step().touched) return std::nullopt;
+      } catch (const dynamics::RunsAway& error) {
+        throw WithoutRegime(error.what());
+      }
       roll.set_contact(contact);
       const FollowedEvent event{roll.spin() * roll.spin(), roll.time() - seconds, roll.position() - metres};
       seconds = roll.time(), metres = roll.position();
@@ -185,11 +190,17 @@ Problem Setting::problem(const LandingOptions& landings) const {
       return map;
     } catch (const dynamics::TableTooLong& error) {
       throw NotTabulated(error.what());
+    } catch (const dynamics::RunsAway& error) {
+      throw WithoutRegime(error.what());
     }
   }());
   if (!found) return problem;
   problem.follow = [=, motion = motion(), noise = noise(), leg = first_landing_leg](auto seed, auto index, auto most) {
-    return dynamics::steps_to_rest(motion, noise, *speed, leg, seed, index, most);
+    try {
+      return dynamics::steps_to_rest(motion, noise, *speed, leg, seed, index, most);
+    } catch (const dynamics::RunsAway& error) {
+      throw WithoutRegime(error.what());
+    }
   };
   if (noise_free()) problem.run = rolls(std::make_shared<const dynamics::SettledMotion>(motion()), noise());
   return problem;

@@ -140,7 +140,7 @@ std::optional<Metastability> trial_study(const Problem& problem, const StudyOpti
   StepShares shares;
   for (const double one : steps) shares[one] += 1 / static_cast<double>(steps.size());
   fill_steps(problem, shares, result);
-  // Of the regime trials tell nothing: whatever rate there is.
+  // Trials tell nothing of the regime: any rate is possible.
   result.spectrum.failure_rate = {1 / found.mean, 0, 1};
   result.steps.from_quasi_stationary = {found.mean, 1, unbounded};
   result.steps.worst_start = {1, 1, unbounded};

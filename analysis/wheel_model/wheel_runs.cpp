@@ -406,7 +406,7 @@ std::vector<ExtendedWheel> wheels_on_ramps(const WheelRuns& measured, const dyna
 void tabulate_landings(WheelRuns& measured) {
   measured.landings.clear();
   if (measured.law != dynamics::Law::settled) return;
-  constexpr double degree = std::numbers::pi / 180, margin = 0.03, slowest = 1, fastest = 15;
+  constexpr double degree = std::numbers::pi / 180, margin = 0.03, slowest = 1, fastest = fastest_tabulated;
   double low = fastest, high = slowest;
   for (const WheelRun& run : measured.runs)
     for (const RunCollision& m : run.collisions) {

@@ -70,6 +70,9 @@ inline constexpr double settled_precision = 0.0005;
 /// Says the same of a slide [m]: torques and slopes that the law does not hold move a foot's hops by up to twice that.
 inline constexpr double settled_slide_precision = 0.0002;
 
+/// Landings under `settled` are tabulated up to this speed before a collision [rad/s].
+inline constexpr double fastest_tabulated = 15;
+
 /// Tabulates the landings of every condition anew, under `settled`; under other laws there are none.
 void tabulate_landings(WheelRuns& measured);
 

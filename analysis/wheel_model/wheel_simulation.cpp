@@ -6,6 +6,7 @@
 #include <array>
 #include <cmath>
 #include <limits>
+#include <optional>
 
 #include "analysis/statistics/random.h"
 #include "dynamics/numerics/truncated_normal.h"

@@ -18,6 +18,7 @@
 #include "analysis/wheel_model/wheel_runs.h"
 #include "analysis/wheel_model/wheel_simulation.h"
 #include "dynamics/catalogue/effect_catalogue.h"
+#include "dynamics/wheel/ranges.h"
 
 namespace metastable::analysis {
 
@@ -68,10 +69,6 @@ std::vector<EffectGroup> wheel_groups() {
           {"legs that differ", {"leg_lengths", "leg_contact", "hub_eccentricity"}},
           {"trials that differ", {"trial_drift", "trial_spread"}}};
 }
-
-constexpr const char* slope_name = "slope_deg";
-constexpr const char* launch_name = "initial_speed_rad_s";
-constexpr double fastest_launch = 100;  // [rad/s]
 
 class WheelTransitions : public TransitionModel {
  public:
@@ -322,24 +319,29 @@ std::pair<std::string, std::unique_ptr<TransitionModel>> WheelTransitions::elsew
     const std::vector<NamedValue>& place) const {
   auto there = std::make_unique<WheelTransitions>(*this);
   WheelRuns& runs = there->measured_;
-  const double steepest = dynamics::steepest_slope(runs.wheel.legs()) * 180 / std::numbers::pi;
+  dynamics::Range speeds = dynamics::range::speed;
+  speeds.low_open = true;
+  if (!runs.landings.empty()) speeds.high = fastest_tabulated;
+  const auto require = [](const NamedValue& one, const dynamics::Range& range, const char* unit) {
+    if (!range.holds(one.second))
+      throw std::invalid_argument(fmt::format("{}: {} is outside {} {}", one.first, one.second, range.text(), unit));
+  };
   std::vector<std::string> words;
-  for (const auto& [name, value] : place) {
-    if (name == slope_name) {
-      if (!(value > 0 && value < steepest))
-        throw std::invalid_argument(fmt::format("{}: {} is outside (0, {:.4g}) deg", name, value, steepest));
+  for (const NamedValue& one : place) {
+    const double value = one.second;
+    if (one.first == other_slope) {
+      require(one, dynamics::slope_range(runs.wheel.legs()), "deg");
       for (Condition& condition : runs.conditions) condition.slope_deg = value;
       words.push_back(fmt::format("on a slope of {:.6g} deg", value));
-    } else if (name == launch_name) {
-      if (!(value > 0 && value < fastest_launch))
-        throw std::invalid_argument(fmt::format("{}: {} is outside (0, {}) rad/s", name, value, fastest_launch));
+    } else if (one.first == other_launch) {
+      require(one, speeds, "rad/s");
       for (Condition& condition : runs.conditions)
         if (condition.initial_speed) condition.initial_speed->mean = value;
       for (WheelRun& run : runs.runs) run.collisions.front().before = value;
       words.push_back(fmt::format("with launches at {:.6g} rad/s", value));
     } else {
       throw std::invalid_argument(
-          fmt::format("{}: a wheel's place is told by {} and {}", name, slope_name, launch_name));
+          fmt::format("{}: a wheel's place is told by {} and {}", one.first, other_slope, other_launch));
     }
   }
   tabulate_landings(runs);

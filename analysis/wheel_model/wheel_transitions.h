@@ -13,6 +13,9 @@ namespace metastable::analysis {
 /// where the transitions bear that out. @throws std::invalid_argument as wheel_runs()
 WheelRuns runs_with_legs(const Experiment& experiment);
 
+/// Names of what TransitionModel::elsewhere() knows of a wheel: the slope [deg], and omega- of the launch [rad/s].
+inline constexpr const char *other_slope = "at-slope", *other_launch = "at-speed";
+
 /// The model gives one-step densities of the wheel's trials under the nominal law with its (eta, mu) and the
 /// catalogue's effects. With omega_plus, collision and stance are separate events; sensor noise is carried along by a
 /// Gaussian filter on the speed (exact while the noise is small beside the spread of a collision). Recalibration refits

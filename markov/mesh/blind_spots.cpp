@@ -18,10 +18,12 @@ constexpr std::uint64_t states_stream = 0x9000, scores_stream = 0xa000, places_s
 constexpr std::size_t lines_probed = 3000, on_a_line = 16, probed_together = 64;
 constexpr double least_reach = 6, reach_in_sds = 8.5;  // of a line [sds]: places of a curve hang on it
 constexpr double others_heat = 2;                      // of the scores but the first
-constexpr double above_nodes = 2;  // of one score: a line fails so much oftener than any node around,
-constexpr double line_fails = 0.3, nodes_fail_share = 0.03;  // of several: more than the first where no node does the
-                                                             // second, nor the first under the line's other scores
-constexpr double tolerated_errors = 2;                       // standard errors
+// A line of one score is a blind spot where it fails twice as often as any node around it.
+constexpr double above_nodes = 2;
+// A line of several scores is one where it fails in more than the first share and no node around it in more than the
+// second, and where it does not fail like that under its other scores.
+constexpr double line_fails = 0.3, nodes_fail_share = 0.03;
+constexpr double tolerated_errors = 2;  // standard errors
 constexpr double jump_worth = 0.01;     // of the rate: a difference of failing between neighbours that is looked into,
 constexpr std::size_t jump_edges = 32;  // so many of them,
 constexpr int jump_halvings = 7;        // so often

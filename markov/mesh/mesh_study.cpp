@@ -35,11 +35,15 @@ constexpr double most_blind = 0.1;    // of the failures, in blind spots: beyond
 constexpr double least = 0.25;        // of what the extrapolation's last order moved: its error
 constexpr double row_error = 5e-4;    // what reading rows off curves may leave, about so much
 constexpr std::size_t fewest_trials = 100;
-constexpr std::size_t walk_count = 512;      // counted where trials would be fewer,
-constexpr double least_counted_share = 0.5;  // with so much of the steps: an eighth of a quick study's time
-constexpr std::size_t pilot_share = 16;      // trials for one of the pilot, which sees whether trials end,
+// Where fewer trials than this would be simulated, walks that do not end are counted instead, with half of the steps
+// that trials have: an eighth of a quick study's time.
+constexpr std::size_t walk_count = 512;
+constexpr double least_counted_share = 0.5;
+// A pilot of one trial in sixteen, of 8 to 128, sees whether trials end within four times the expected steps: of 8, 7
+// at least do.
+constexpr std::size_t pilot_share = 16;
 constexpr std::size_t pilot_least = 8, pilot_most = 128;
-constexpr double pilot_steps = 4;  // within so many times the expected steps: of 8, 8 or 7 do.
+constexpr double pilot_steps = 4;
 // States of a row where the chance of failing jumps, by dimension: of 32 in one dimension shifts differ by 4 per cent.
 constexpr std::array<int, 4> row_states_by_dimension{256, 32, 16, 16};
 constexpr double memory_side_by_side = 0.5;  // of all: for the meshes of a dear map that grow side by side

@@ -192,7 +192,7 @@ Command verify() {
                         o.text("export"), o.text("json"), line});
           },
           "",
-          {"metastable verify", "metastable verify --out evidence", "metastable verify --export chain"}};
+          {"metastable verify", "metastable verify --out evidence --export chain"}};
 }
 
 // Returns what CLI11 knows of the commands' options, for help, manual pages and completion.

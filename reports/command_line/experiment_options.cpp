@@ -7,6 +7,7 @@
 
 #include "analysis/experiment/stand_in.h"
 #include "analysis/experiment/suggestion.h"
+#include "analysis/wheel_model/wheel_transitions.h"
 #include "dynamics/wheel/contact_law.h"
 #include "reports/command_line/command.h"
 #include "reports/command_line/option_values.h"
@@ -373,9 +374,12 @@ void declare_diagnose(Options& o) {
   o.add("catalogue", "FILE|ID,ID,...", "",
         "Effects to consider, in a list or a file with one a line (default: all of 'metastable effects'); a pair, "
         "trial_drift+bounce, is tried in any case, and a list of pairs alone extends the whole catalogue");
-  o.add("at-slope", "DEG", "", "Expected steps of this machine on another slope, too");
-  o.add("at-speed", "RAD_S", "",
-        "Expected steps of this machine launched at another omega just before the first collision, too");
+  o.add(analysis::other_slope, "DEG", "",
+        "Expected steps of this machine on another slope, too; from 0.001 to below half of the angle between legs");
+  o.add(analysis::other_launch, "RAD_S", "",
+        "Expected steps of this machine launched at another omega just before the first collision, too; in (0, 1000], "
+        "and "
+        "up to 15 under settled");
   o.add_seed();
   o.add_threads();
   o.add_json();
@@ -386,8 +390,8 @@ DiagnoseRequest diagnose_request(const Options& o, const std::string& line) {
   DiagnoseRequest request;
   request.folder = o.text("DIR");
   if (o.given("catalogue")) request.options.catalogue = catalogue_value("catalogue", o.text("catalogue"));
-  for (const auto& [flag, name] : {std::pair{"at-slope", "slope_deg"}, {"at-speed", "initial_speed_rad_s"}})
-    if (o.given(flag)) request.options.elsewhere.emplace_back(name, o.number(flag));
+  for (const char* place : {analysis::other_slope, analysis::other_launch})
+    if (o.given(place)) request.options.elsewhere.emplace_back(place, o.number(place));
   request.options.seed = o.seed();
   request.options.threads = o.threads();
   request.json = o.text("json");

@@ -30,7 +30,8 @@ void declare_steps(Options& o) {
   o.add_json();
   o.group("Method and accuracy");
   o.add("time-limit", "S", fmt::format("{}", usual_time_limit),
-        "Wall clock after which there is a sentence instead of a number (exit code 3). Results do not depend on it",
+        "Wall clock after which there is a sentence instead of a number (exit code 3), or instead of the check of "
+        "rigid bodies where the number is there. Results do not depend on it",
         time_limits);
   add_walker(o, "DEG");
 }

@@ -192,7 +192,7 @@ analysis::Shrinkage unknown_shrinkage() {
 Json steps_json(const analysis::StepsBeforeFailure& s) {
   Json machine = Json::array();
   for (const analysis::MachineSteps& one : s.machine)
-    machine.push_back({{"where", one.where},
+    machine.push_back({{"where", one.where.empty() ? "as measured" : one.where},
                        {"steps", positive_or_null(one.steps.value)},
                        {"interval_90", {positive_or_null(one.steps.lower), positive_or_null(one.steps.upper)}},
                        {"at_least", one.at_least}});

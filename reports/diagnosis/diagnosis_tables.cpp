@@ -277,20 +277,20 @@ Table steps_table(const Diagnosis& d) {
                           {.name = "with effect", .level = 90},
                           {.name = "this machine", .level = 90}}};
   const auto model = [](double value, const std::optional<Estimate>& interval) {
-    return interval ? Cell(Estimate{value, interval->lower, interval->upper}) : positive(value);
+    return value > 0 && interval ? Cell(Estimate{value, interval->lower, interval->upper}) : positive(value);
   };
-  for (const analysis::MachineSteps& machine : s.machine) {
-    const bool here = &machine == &s.machine.front();
-    const Cell own =
-        machine.at_least ? Cell(fmt::format("at least {:.3g} (95 %)", machine.steps.lower)) : Cell(machine.steps);
-    if (here)
-      table.rows.push_back({machine.where,
-                            s.observed > 0 ? Cell(Estimate{s.observed, s.observed_lower, s.observed_upper}) : Cell(""),
-                            positive(s.baseline), model(s.recalibrated, s.recalibrated_90),
-                            model(s.with_effect, s.with_effect_90), own});
-    else
-      table.rows.push_back({machine.where, Cell(""), Cell(""), Cell(""), Cell(""), own});
-  }
+  const auto own = [](const analysis::MachineSteps& machine) {
+    return machine.at_least ? Cell(fmt::format("at least {} (95 %)", short_number(machine.steps.lower)))
+                            : Cell(machine.steps);
+  };
+  const auto here = std::ranges::find(s.machine, "", &analysis::MachineSteps::where);
+  table.rows.push_back({"as measured",
+                        s.observed > 0 ? Cell(Estimate{s.observed, s.observed_lower, s.observed_upper}) : Cell(""),
+                        positive(s.baseline), model(s.recalibrated, s.recalibrated_90),
+                        model(s.with_effect, s.with_effect_90), here == s.machine.end() ? Cell("") : own(*here)});
+  for (const analysis::MachineSteps& machine : s.machine)
+    if (!machine.where.empty())
+      table.rows.push_back({machine.where, Cell(""), Cell(""), Cell(""), Cell(""), own(machine)});
   return table;
 }
 
@@ -319,8 +319,9 @@ Table profile_table(const Diagnosis& d) {
 Table visibility_table(const Diagnosis& d) {
   Table table{.id = "visibility",
               .title = "What these data could have seen",
-              .notes = {"Smallest: the size that most experiments like this one would find (2 Δ ln L of 16). Alike: "
-                        "effects that imitate more than half of its information."},
+              .notes = {fmt::format("Smallest: the size that most experiments like this one would find (2 Δ ln L of "
+                                    "{:.0f}). Alike: effects that imitate more than half of its information.",
+                                    d.rules.seen_gain)},
               .columns = {{"effect"}, {"parameter"}, {"smallest"}, {"unit"}, {"alike"}, {"cannot be told because"}}};
   for (const analysis::Detectability& v : d.limits.visible) {
     std::string alike;

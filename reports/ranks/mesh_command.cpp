@@ -15,7 +15,7 @@
 namespace metastable::reports {
 namespace {
 
-constexpr double probe_stride = 1e-7;  // the survivors are followed until the rate changes by 1e-9
+constexpr double most_apart = 1e-7;  // the survivors are followed until the rate changes by 1e-9
 
 struct SharedAnswer {
   std::uint64_t nodes = 0, entries = 0;
@@ -53,7 +53,7 @@ SharedAnswer solve(const SharedMeshRequest& request, markov::Ranks& ranks) {
   answer.own_entries = ranks.gather(static_cast<double>(mesh.own_entries()));
   answer.memory = ranks.gather(markov::peak_memory());
   const double apart = answer.solved.steps / answer.followed.steps_lower - 1;
-  if (!(std::abs(apart) <= probe_stride))
+  if (!(std::abs(apart) <= most_apart))
     throw markov::Disagreement(
         fmt::format("{}: products ({:.10g} steps) and PETSc ({:.10g}) disagree: no number is given",
                     request.setting.describe(), answer.followed.steps_lower, answer.solved.steps));

@@ -107,7 +107,7 @@ Json expected_steps_json(const analysis::StepsToRest& steps) {
           {"quantiles", accumulated(steps.distribution)["quantiles"]}};
 }
 
-// What has no total is without end, or not known.
+// Work without a total is without end, or its end is not known.
 Json total_json(const std::optional<analysis::Accumulated>& total, bool endless) {
   if (total) return accumulated(*total);
   return endless ? Json("infinite") : Json(nullptr);

@@ -1,6 +1,6 @@
 // Not timed: turns each rule of the diagnosis by a quarter up and down on sealed cases, and prints what changes.
 //
-//   metastable blind make RUN --seed 2050 --law both --per-effect 1 --none 10 --pairs 10 --outside 10
+//   metastable blind make RUN --seed 2050 --law both --per-effect 1 --none 10 --pairs 10 --outside 10 --left-out 0
 //   turned_rules RUN [LAW]
 //
 // LAW (published, settled) takes the cases of one law alone. Truths are read, so that the run is spent.
@@ -37,7 +37,7 @@ Truth read_truth(const fs::path& file) {
   return truth;
 }
 
-// What an answer amounts to beside the truth.
+// The grade of an answer beside the truth.
 struct Amounts {
   bool alarm = false;     // a gap is claimed where there is none
   bool misnamed = false;  // an effect is said to be at work, and neither it nor one of its group is
@@ -99,7 +99,8 @@ int main(int count, char** arguments) {
   std::vector<Count> counts(turned.size());
   int cases = 0;
   std::vector<fs::path> folders;
-  for (const auto& entry : fs::directory_iterator(run / "cases")) folders.push_back(entry.path());
+  for (const auto& entry : fs::directory_iterator(run / "cases"))
+    if (fs::exists(entry.path() / "seal.txt")) folders.push_back(entry.path());
   std::ranges::sort(folders);
   for (const fs::path& folder : folders) {
     const Truth truth = read_truth(run.string() + "-sealed/" + folder.filename().string() + ".json");

@@ -170,7 +170,7 @@ TEST(BlindCases, LeftOutEffectsAreNotInTheCatalogueGiven) {
 // The laboratory and the likelihood of the diagnosis, which share no formula, agree on the same effects.
 TEST(EffectPower, GrowsLikeTheSquareOfTheSize) {
   PowerDesign design = steep_ramp(60);
-  design.reality.sensor_noise = 0.01;
+  design.laboratory.sensor_noise = 0.01;
   const auto power = [&](const std::string& text) {
     return expected_power(design, {dynamics::effect_from_text(text, paper)}, 4);
   };
@@ -222,7 +222,7 @@ TEST(BlindCases, AnOutsideEffectHasThePowerAskedForBeforeItStopsTheWheel) {
   for (const double usual : {0.002, 0.02, 0.1}) {  // size of a power of 16
     const BlindCase made = blind_case({BlindKind::outside, {}, 2, dynamics::Law::published, "two_crews"}, 1, 5,
                                       [usual](const PowerDesign& design, const std::vector<dynamics::Effect>&) {
-                                        const double times = design.reality.outside.front().size / usual;
+                                        const double times = design.laboratory.outside.front().size / usual;
                                         return times < 2.4 ? 16 * times * times : 0.0;
                                       });
     if (usual < 0.05) {

@@ -30,8 +30,8 @@ LaboratoryFiles with_effect(const Setting& base, const dynamics::Effect& effect,
                             const std::vector<std::string>& dropped) {
   std::vector<LaboratoryCondition> conditions = stand_in_conditions(base);
   for (LaboratoryCondition& c : conditions) c.trials = 25;
-  const LaboratoryOptions reality{.effects = {effect}, .sensor_noise = 0.008, .flight = false, .seed = 5};
-  const dynamics::LaboratorySetup setup = laboratory_setup(conditions, reality);
+  const LaboratoryOptions laboratory{.effects = {effect}, .sensor_noise = 0.008, .flight = false, .seed = 5};
+  const dynamics::LaboratorySetup setup = laboratory_setup(conditions, laboratory);
   return laboratory_files(conditions, setup, run_laboratory(setup, 0), {.dropped = dropped});
 }
 

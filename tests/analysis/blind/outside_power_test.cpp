@@ -19,7 +19,7 @@ PowerDesign two_ramps() {
 
 double power_of(const dynamics::OutsideEffect& effect) {
   PowerDesign design = two_ramps();
-  design.reality.outside = {effect};
+  design.laboratory.outside = {effect};
   return expected_power(design, {}, 2);
 }
 
@@ -49,9 +49,9 @@ TEST(OutsidePower, WhatActsThroughThePastHasNoLikelihood) {
 TEST(OutsidePower, RecalibrationTakesWhatMeansHold) {
   const auto left = [](const dynamics::OutsideEffect& effect) {
     PowerDesign design = two_ramps();
-    design.reality.outside = {effect};
-    design.reality.seed = 4;
-    const dynamics::LaboratorySetup setup = laboratory_setup(design.conditions, design.reality);
+    design.laboratory.outside = {effect};
+    design.laboratory.seed = 4;
+    const dynamics::LaboratorySetup setup = laboratory_setup(design.conditions, design.laboratory);
     const Experiment made = experiment_of(design.conditions, setup, run_laboratory(setup, 1), {});
     const Setting& stated = design.conditions[0].setting;
     const dynamics::NominalValues contact = stated_values(stated.restitution, stated.friction, stated.wheel.leg_length);

@@ -15,7 +15,7 @@ inline PowerDesign steep_ramp(int trials) {
   base.slope_deg = 9.59;
   base.initial_speed = {5.83, 0.28};
   design.conditions = {{"fast", base, trials}};
-  design.reality.flight = false;
+  design.laboratory.flight = false;
   return design;
 }
 

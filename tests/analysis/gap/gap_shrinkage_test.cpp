@@ -45,8 +45,8 @@ TEST(GapShrinkage, TheTrueEffectClosesTheGap) {
   }
 }
 
-// What lies between two of its models as a part is what lies between them in the measure; the effect in the model as
-// given closes less than with the losses refitted, and something.
+// The part between two of the measure's models is the difference of the measure between them. The effect in the model
+// as given closes something, and less than with the losses refitted.
 TEST(HeldOut, PartsAreThoseOfTheMeasure) {
   const auto design = coast_down_transitions(test::coasting_rotor());
   const EffectTerm truth = test::term(*design, "rolling_resistance", {}, {0.02});

@@ -129,7 +129,7 @@ TEST(Consistency, SurvivorsThatGainWithoutEndHaveNoAnswer) {
   try {
     study(problem, {.tolerance = 0.05, .brief = true});
     FAIL();
-  } catch (const RunsAway& error) {
+  } catch (const WithoutRegime& error) {
     EXPECT_NE(std::string(error.what()).find("survivors gain from step to step without end"), std::string::npos)
         << error.what();
   }

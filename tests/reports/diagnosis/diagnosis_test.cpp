@@ -75,8 +75,7 @@ analysis::Diagnosis sample() {
   d.shrinkage.measures = {score, open};
   d.shrinkage.steps = {
       .observed = infinity, .observed_lower = 40, .observed_upper = infinity, .baseline = 50, .with_effect = 70};
-  d.shrinkage.steps.machine = {{"as measured", {90, 60, infinity}, true},
-                               {"on a slope of 8 deg", {120, 80, 170}, false}};
+  d.shrinkage.steps.machine = {{"", {3000, 1300, infinity}, true}, {"on a slope of 8 deg", {120, 80, 170}, false}};
   d.limits.visible = {{"leg_contact", "friction_ratio", 0.04, {{"leg_lengths", 0.7}}, ""},
                       {"sensor_noise", "sd_rad_s", 0, {}, "no noise is stated"}};
   d.limits.missing = {{"leg", {{"leg_contact", "friction_ratio", {}, 0.04, {"friction_patch"}}}}, {"position_m", {}}};
@@ -188,7 +187,7 @@ TEST(DiagnosisText, SaysTheVerdictFirstAndAnswersEveryQuestion) {
                            "not known: the gap as given may be none",
                            "Expected steps before failure",
                            "infinite",
-                           "at least 60",
+                           "at least 1300",
                            "on a slope of 8 deg",
                            "120 (80 to 170)",
                            "What these data could have seen",

@@ -50,6 +50,29 @@ TEST_F(DiagnoseCommand, FindsWhatTheLaboratoryPutIn) {
   EXPECT_EQ(again, first);
 }
 
+// Another place has expected steps, and is refused where no wheel of these legs could roll.
+TEST_F(DiagnoseCommand, SaysTheStepsOfAnotherPlace) {
+  ASSERT_EQ(
+      metastable({"simulate", "--slope", "9.59", "--law", "published", "--trials", "40", "--out", path("wheel")}).code,
+      0);
+  const auto asked = [&](std::vector<std::string> place) {
+    return metastable(
+        with({"diagnose", path("wheel"), "--catalogue", "slope_offset", "--json", "-"}, std::move(place)));
+  };
+  const Ran ran = asked({"--at-slope", "8", "--at-speed", "5"});
+  ASSERT_EQ(ran.code, 0) << ran.err;
+  const auto machine = nlohmann::json::parse(ran.out).at("steps_before_failure").at("machine");
+  ASSERT_EQ(machine.size(), 2U);
+  EXPECT_EQ(machine[0].at("where"), "as measured");
+  EXPECT_EQ(machine[1].at("where"), "on a slope of 8 deg and with launches at 5 rad/s");
+  EXPECT_LT(machine[1].at("interval_90")[0], machine[1].at("interval_90")[1]);
+  EXPECT_NE(asked({"--at-slope", "30"}).err.find("at-slope: 30 is outside [0.001, 22.5) deg\n"), std::string::npos)
+      << asked({"--at-slope", "30"}).err;
+  EXPECT_NE(asked({"--at-speed", "0"}).err.find("at-speed: 0 is outside (0, 1000] rad/s\n"), std::string::npos)
+      << asked({"--at-speed", "0"}).err;
+  EXPECT_EQ(asked({"--at-speed", "0"}).code, 2);
+}
+
 // The second system is a drum that loses a tenth more than stated.
 TEST_F(DiagnoseCommand, TakesACoastDown) {
   std::string rows = "trial,collision,time_s,omega_minus_rad_s\n";
