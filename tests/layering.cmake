@@ -29,7 +29,7 @@ set(ROOMS
   "analysis/study: markov markov/chain markov/passage markov/transition_rows dynamics/numerics dynamics/wheel dynamics/settled dynamics/return_map dynamics/bounds analysis/statistics"
   "analysis/experiment: markov dynamics/catalogue dynamics/wheel dynamics/laboratory dynamics/extended_wheel dynamics/return_map analysis/statistics analysis/study"
   "analysis/description: markov dynamics/numerics dynamics/return_map analysis/statistics analysis/experiment"
-  "analysis/wheel_model: dynamics/numerics dynamics/catalogue dynamics/step_density dynamics/settled dynamics/extended_wheel analysis/statistics analysis/fitting analysis/experiment"
+  "analysis/wheel_model: dynamics/numerics dynamics/catalogue dynamics/wheel dynamics/step_density dynamics/settled dynamics/extended_wheel analysis/statistics analysis/fitting analysis/experiment"
   "analysis/drum_model: dynamics/numerics dynamics/catalogue analysis/statistics analysis/fitting analysis/experiment"
   "analysis/experiment_model: analysis/fitting analysis/diagnosis analysis/experiment analysis/wheel_model analysis/drum_model"
   "analysis/blind: dynamics/numerics dynamics/catalogue analysis/statistics analysis/fitting analysis/diagnosis analysis/experiment analysis/wheel_model"
@@ -43,7 +43,7 @@ set(ROOMS
   "reports/import: analysis/experiment analysis/motion_capture reports/output"
   "reports/commands: markov markov/passage markov/mesh dynamics/wheel analysis/statistics analysis/walkers analysis/diagnosis analysis/study analysis/experiment analysis/description analysis/blind analysis/motion_capture analysis/paper analysis/sensitivity reports/output reports/study reports/import"
   "reports/experiment_commands: markov dynamics/catalogue dynamics/wheel analysis/statistics analysis/diagnosis analysis/study analysis/experiment analysis/description analysis/experiment_model analysis/blind analysis/motion_capture analysis/paper reports/output reports/description reports/diagnosis reports/study reports/import reports/commands"
-  "reports/command_line: dynamics/catalogue dynamics/wheel analysis/study analysis/experiment analysis/sensitivity reports/output reports/commands reports/experiment_commands"
+  "reports/command_line: dynamics/catalogue dynamics/wheel analysis/study analysis/experiment analysis/wheel_model analysis/sensitivity reports/output reports/commands reports/experiment_commands"
   "reports/ranks: markov/mesh markov/ranks analysis/walkers reports/output reports/commands reports/command_line"
   "reports/python: markov/chain markov/passage markov/mesh analysis/walkers analysis/study analysis/experiment analysis/experiment_model analysis/sensitivity reports/output reports/diagnosis reports/study reports/commands reports/experiment_commands reports/command_line")
 

@@ -11,13 +11,8 @@
 #include "reports/output/interrupt.h"
 #include "tests/reports/program.h"
 
-namespace metastable::reports {
+namespace metastable::reports::test {
 namespace {
-using test::CommandLine;
-using test::metastable;
-using test::quick;
-using test::Ran;
-using test::with;
 
 TEST_F(CommandLine, HelpAndVersion) {
   EXPECT_EQ(metastable({"--help"}).code, 0);
@@ -86,4 +81,4 @@ TEST_F(CommandLine, WrongInputIsOneLineAndCodeTwo) {
 }
 
 }  // namespace
-}  // namespace metastable::reports
+}  // namespace metastable::reports::test

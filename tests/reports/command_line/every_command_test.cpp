@@ -13,12 +13,10 @@
 #include "tests/reports/program.h"
 #include "tests/reports/support.h"
 
-namespace metastable::reports {
+namespace metastable::reports::test {
 namespace {
-using test::metastable;
-using test::Ran;
 
-class EveryCommand : public test::InFolder {
+class EveryCommand : public InFolder {
  protected:
   void SetUp() override {
     InFolder::SetUp();
@@ -109,7 +107,7 @@ TEST_F(EveryCommand, NamesTheOptionWhoseValueIsNone) {
 }
 
 TEST_F(EveryCommand, ThatReadsAFolderNamesFileLineAndColumn) {
-  const std::string rows = test::read(path("exp/collisions.csv")),
+  const std::string rows = read(path("exp/collisions.csv")),
                     cell = rows.substr(0, rows.find('\n') + 1) + "7.02,1,1,x\n";
   file("exp/collisions.csv", cell);
   const std::string said = fmt::format("metastable: {}:2", path("exp/collisions.csv"));
@@ -173,7 +171,7 @@ TEST_F(EveryCommand, WritesItsJsonIntoAFileOfItsOwn) {
 TEST_F(EveryCommand, WritesItsJsonIntoTheFolderOfTheOthers) {
   const Ran ran = metastable({"describe", path("exp"), "--out", path("new"), "--json", path("new/new.json")});
   EXPECT_EQ(ran.code, 0) << ran.err;
-  const auto told = nlohmann::json::parse(test::read(path("new/new.json")));
+  const auto told = nlohmann::json::parse(read(path("new/new.json")));
   for (const std::string name : told["files"]) EXPECT_TRUE(std::filesystem::exists(name)) << name;
   EXPECT_EQ(told["files"].size() + 1, [&] {  // and new.json
     std::size_t files = 0;
@@ -184,4 +182,4 @@ TEST_F(EveryCommand, WritesItsJsonIntoTheFolderOfTheOthers) {
 }
 
 }  // namespace
-}  // namespace metastable::reports
+}  // namespace metastable::reports::test

@@ -13,12 +13,10 @@
 #include "tests/reports/program.h"
 #include "tests/reports/support.h"
 
-namespace metastable::reports {
+namespace metastable::reports::test {
 namespace {
-using test::metastable;
-using test::Ran;
 
-class ExitCodes : public test::InFolder {
+class ExitCodes : public InFolder {
  protected:
   const std::vector<std::string> quick_{"--legs", "0.1519", "--cells", "32", "--samples", "256", "--replicates", "2"};
   std::vector<std::string> quick(std::vector<std::string> words) const {
@@ -34,7 +32,7 @@ class ExitCodes : public test::InFolder {
 // It runs in a process of its own: the stream stays broken.
 void run_into_full_device(const std::vector<std::string>& words) {
   ::dup2(::open("/dev/full", O_WRONLY), STDOUT_FILENO);
-  ::_exit(test::run(words));
+  ::_exit(run(words));
 }
 
 TEST_F(ExitCodes, FullDeviceIsTwoAndALine) {
@@ -68,7 +66,7 @@ void run_and_signal(const std::vector<std::string>& words, int signal) {
     std::this_thread::sleep_for(std::chrono::milliseconds(300));
     ::kill(::getpid(), signal);
   }).detach();
-  ::_exit(test::run(words));
+  ::_exit(run(words));
 }
 
 TEST_F(ExitCodes, PipesThatNobodyWritesToOrReadsEndAtASignal) {
@@ -96,7 +94,7 @@ TEST_F(ExitCodes, TimeLimitIsThreeAndASentence) {
   EXPECT_EQ(metastable({"steps", "--time-limit", "0"}).code, 2);
   ASSERT_EQ(metastable(quick({"steps", "--time-limit", "1e8", "--json", path("with.json")})).code, 0);
   ASSERT_EQ(metastable(quick({"steps", "--json", path("without.json")})).code, 0);
-  EXPECT_EQ(test::read(path("with.json")), test::read(path("without.json")));
+  EXPECT_EQ(read(path("with.json")), read(path("without.json")));
 }
 
 TEST_F(ExitCodes, PipesAreReadToTheirEnd) {
@@ -130,10 +128,10 @@ TEST_F(ExitCodes, DevicesAreNotRead) {
 TEST_F(ExitCodes, MissingGnuplotIsThree) {
   const auto without_programs = [&] {
     ::setenv("PATH", path("empty").c_str(), 1);
-    ::_exit(test::run(quick({"sweep", "--friction-mean", "0.3,0.4", "--out", path("s.csv")})));
+    ::_exit(run(quick({"sweep", "--friction-mean", "0.3,0.4", "--out", path("s.csv")})));
   };
   EXPECT_EXIT(without_programs(), testing::ExitedWithCode(3), "gnuplot, which draws the figures, was not found");
 }
 
 }  // namespace
-}  // namespace metastable::reports
+}  // namespace metastable::reports::test

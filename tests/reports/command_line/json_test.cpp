@@ -12,13 +12,11 @@
 #include "tests/reports/program.h"
 #include "tests/reports/support.h"
 
-namespace metastable::reports {
+namespace metastable::reports::test {
 namespace {
-using test::metastable;
-using test::Ran;
 using Json = nlohmann::json;
 
-class JsonOfEveryCommand : public test::InFolder {
+class JsonOfEveryCommand : public InFolder {
  protected:
   // Returns what a command answers; null where it is no JSON alone.
   Json answer(std::vector<std::string> words) const {
@@ -71,7 +69,7 @@ TEST_F(JsonOfEveryCommand, IsAllOfStandardOutput) {
 TEST_F(JsonOfEveryCommand, IsAFileBesideWhatIsPrintedOrRefused) {
   const Ran plain = metastable({"doctor"}), both = metastable({"doctor", "--json", path("doctor.json")});
   EXPECT_EQ(both.out, plain.out);
-  EXPECT_TRUE(Json::parse(test::read(path("doctor.json")))["facts"].contains("version"));
+  EXPECT_TRUE(Json::parse(read(path("doctor.json")))["facts"].contains("version"));
   const Ran full = metastable({"doctor", "--json", "/dev/full"}), none = metastable({"doctor", "--json", ""});
   EXPECT_EQ(full.code, 2);
   EXPECT_EQ(full.err, "metastable: cannot write /dev/full: No space left on device\n");
@@ -108,4 +106,4 @@ TEST_F(JsonOfEveryCommand, TellsWhatIsPrinted) {
 }
 
 }  // namespace
-}  // namespace metastable::reports
+}  // namespace metastable::reports::test

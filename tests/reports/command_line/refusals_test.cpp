@@ -11,10 +11,8 @@
 #include "tests/reports/program.h"
 #include "tests/reports/support.h"
 
-namespace metastable::reports {
+namespace metastable::reports::test {
 namespace {
-using test::metastable;
-using test::Ran;
 
 struct Case {
   std::vector<std::string> words;
@@ -31,7 +29,7 @@ void expect_refused(const std::vector<Case>& cases) {
   }
 }
 
-using Refusals = test::InFolder;
+using Refusals = InFolder;
 
 TEST_F(Refusals, OfWheelsThatSettledDoesNotHold) {
   const auto steps = [](std::vector<std::string> more) {
@@ -233,7 +231,7 @@ TEST_F(Refusals, DoNotReachTheEndsOfTheRanges) {
     const Ran ran = metastable(words);
     EXPECT_EQ(ran.code, 0) << ran.err;
     if (ran.code != 0) continue;
-    const auto json = nlohmann::json::parse(test::read(words.back()));
+    const auto json = nlohmann::json::parse(read(words.back()));
     const std::vector<double> survival = json["survival"];
     EXPECT_LE(survival.size(), 10000u);
     EXPECT_TRUE(std::ranges::is_sorted(survival, std::greater<>()));
@@ -241,4 +239,4 @@ TEST_F(Refusals, DoNotReachTheEndsOfTheRanges) {
 }
 
 }  // namespace
-}  // namespace metastable::reports
+}  // namespace metastable::reports::test

@@ -10,14 +10,9 @@
 
 #include "tests/reports/program.h"
 
-namespace metastable::reports {
+namespace metastable::reports::test {
 namespace {
-using test::metastable;
-using test::quick;
-using test::Ran;
-using test::read;
-using test::with;
-using CompareCommand = test::CommandLine;
+using CompareCommand = CommandLine;
 
 TEST_F(CompareCommand, PrintsTheContrast) {
   const Ran ran = metastable(with({"compare", "--json", path("c.json")}, quick));
@@ -98,4 +93,4 @@ TEST_F(CompareCommand, WrongInputIsOneLineAndCodeTwo) {
 }
 
 }  // namespace
-}  // namespace metastable::reports
+}  // namespace metastable::reports::test

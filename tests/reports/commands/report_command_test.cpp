@@ -10,14 +10,9 @@
 
 #include "tests/reports/program.h"
 
-namespace metastable::reports {
+namespace metastable::reports::test {
 namespace {
-using test::metastable;
-using test::quick;
-using test::Ran;
-using test::read;
-using test::with;
-using ReportCommand = test::CommandLine;
+using ReportCommand = CommandLine;
 
 // The whole report, made on one thread and on two, has the same bytes in every file.
 TEST_F(ReportCommand, IsTheSameBytesOnAnyNumberOfThreads) {
@@ -52,4 +47,4 @@ TEST_F(ReportCommand, IsTheSameBytesOnAnyNumberOfThreads) {
 }
 
 }  // namespace
-}  // namespace metastable::reports
+}  // namespace metastable::reports::test

@@ -11,14 +11,9 @@
 
 #include "tests/reports/program.h"
 
-namespace metastable::reports {
+namespace metastable::reports::test {
 namespace {
-using test::metastable;
-using test::quick;
-using test::Ran;
-using test::read;
-using test::with;
-using SolveCommand = test::CommandLine;
+using SolveCommand = CommandLine;
 
 TEST_F(SolveCommand, SaysTheValueOrThatItIsOutOfReach) {
   const std::vector<std::string> asked = with({"solve", "friction-mean", "--steps", "10", "--points", "5"}, quick);
@@ -72,4 +67,4 @@ TEST_F(SolveCommand, WrongInputIsOneLineAndCodeTwo) {
 }
 
 }  // namespace
-}  // namespace metastable::reports
+}  // namespace metastable::reports::test

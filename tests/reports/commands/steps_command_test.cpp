@@ -11,14 +11,9 @@
 
 #include "tests/reports/program.h"
 
-namespace metastable::reports {
+namespace metastable::reports::test {
 namespace {
-using test::metastable;
-using test::quick;
-using test::Ran;
-using test::read;
-using test::with;
-using StepsCommand = test::CommandLine;
+using StepsCommand = CommandLine;
 
 TEST_F(StepsCommand, WritesTheKeysThatWerePromised) {
   const Ran ran = metastable({"steps", "--json", "-"});
@@ -200,4 +195,4 @@ TEST_F(StepsCommand, ALimitThatEndsTheCheckOfRigidBodiesLeavesTheAnswer) {
 }
 
 }  // namespace
-}  // namespace metastable::reports
+}  // namespace metastable::reports::test

@@ -14,15 +14,10 @@
 #include "reports/output/interrupt.h"
 #include "tests/reports/program.h"
 
-namespace metastable::reports {
+namespace metastable::reports::test {
 namespace {
-using test::metastable;
-using test::quick;
-using test::Ran;
-using test::read;
-using test::with;
 
-class SweepCommand : public test::CommandLine {
+class SweepCommand : public CommandLine {
  protected:
   Ran sweep(const std::string& out, const std::string& values = "0.3,0.4") const {
     return metastable({"sweep", "--friction-mean", values, "--legs", "0.1519", "--cells", "32", "--samples", "256",
@@ -144,4 +139,4 @@ TEST_F(SweepCommand, WrongInputIsOneLineAndCodeTwo) {
 }
 
 }  // namespace
-}  // namespace metastable::reports
+}  // namespace metastable::reports::test

@@ -8,11 +8,9 @@
 
 #include "tests/reports/program.h"
 
-namespace metastable::reports {
+namespace metastable::reports::test {
 namespace {
-using test::metastable;
-using test::Ran;
-using VerifyCommand = test::CommandLine;
+using VerifyCommand = CommandLine;
 
 TEST_F(VerifyCommand, SaysOnceWhoseFailureNegativeTimesAre) {
   const Ran ran = metastable({"verify", "--nodes", "128"});
@@ -29,4 +27,4 @@ TEST_F(VerifyCommand, SaysOnceWhoseFailureNegativeTimesAre) {
 }
 
 }  // namespace
-}  // namespace metastable::reports
+}  // namespace metastable::reports::test

@@ -11,13 +11,10 @@
 #include "tests/reports/program.h"
 #include "tests/reports/support.h"
 
-namespace metastable::reports {
+namespace metastable::reports::test {
 namespace {
-using test::metastable;
-using test::Ran;
-using test::read;
 
-class WalkerCommand : public test::InFolder {};
+class WalkerCommand : public InFolder {};
 
 std::vector<std::string> walker(const std::string& command, const std::vector<std::string>& more) {
   std::vector<std::string> words{command, "--walker", "simplest", "--slope-sd", "0.17"};  // 3e-3 rad: 5 steps
@@ -104,4 +101,4 @@ TEST_F(WalkerCommand, TheWheelSaysHowItFails) {
 }
 
 }  // namespace
-}  // namespace metastable::reports
+}  // namespace metastable::reports::test

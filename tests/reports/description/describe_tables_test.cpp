@@ -8,10 +8,8 @@
 
 #include "tests/reports/cells.h"
 
-namespace metastable::reports {
+namespace metastable::reports::test {
 namespace {
-using test::at;
-using test::expect_cell;
 
 constexpr double infinity = std::numeric_limits<double>::infinity();
 constexpr double t_3 = 3.182446305284263;   // 97.5 % quantile of Student's t, 3 degrees of freedom (R: qt(0.975, 3))
@@ -108,7 +106,7 @@ analysis::Description description() {
 
 TEST(DescribeTables, ConditionsHoldWhatTheDescriptionHolds) {
   const Table table = conditions_table(description(), {});
-  test::expect_rectangular(table);
+  expect_rectangular(table);
   ASSERT_EQ(table.rows.size(), 2u);
   expect_cell(at(table, 0, "condition"), "fast");
   expect_cell(at(table, 0, "slope"), 9.59);
@@ -134,7 +132,7 @@ TEST(DescribeTables, ConditionsHoldWhatTheDescriptionHolds) {
 
 TEST(DescribeTables, ProfilesStandSideBySide) {
   const Table table = profiles_table(description(), {});
-  test::expect_rectangular(table);
+  expect_rectangular(table);
   ASSERT_EQ(table.rows.size(), 2u);
   expect_cell(at(table, 0, "collision"), 1);
   expect_cell(at(table, 0, "fast trials"), 51);
@@ -153,7 +151,7 @@ TEST(DescribeTables, ProfilesStandSideBySide) {
 
 TEST(DescribeTables, LegsWithoutACollisionAreLeftOut) {
   const Table table = legs_table(description(), {});
-  test::expect_rectangular(table);
+  expect_rectangular(table);
   ASSERT_EQ(table.rows.size(), 2u);
   expect_cell(at(table, 0, "leg"), 0);
   expect_cell(at(table, 0, "fast"), Estimate{5.41, 5.41 - t_3 * 0.01, 5.41 + t_3 * 0.01});
@@ -165,7 +163,7 @@ TEST(DescribeTables, LegsWithoutACollisionAreLeftOut) {
 
 TEST(DescribeTables, TestsHaveEachItsColumn) {
   const Table table = tests_table(description(), {});
-  test::expect_rectangular(table);
+  expect_rectangular(table);
   ASSERT_EQ(table.rows.size(), 2u);
   expect_cell(at(table, 0, "conditions"), "fast, flat");
   expect_cell(at(table, 0, "values"), "trial means");
@@ -188,7 +186,7 @@ TEST(DescribeTables, TestsHaveEachItsColumn) {
 
 TEST(DescribeTables, SurvivalEndsWithEachCondition) {
   const Table table = survival_table(description(), {});
-  test::expect_rectangular(table);
+  expect_rectangular(table);
   ASSERT_EQ(table.rows.size(), 2u);
   expect_cell(at(table, 1, "n"), 2);
   expect_cell(at(table, 1, "fast at risk"), 48);
@@ -202,7 +200,7 @@ TEST(DescribeTables, SurvivalEndsWithEachCondition) {
 
 TEST(DescribeTables, FitsHoldTheFourParametersInOrder) {
   const Table table = fits_table(description(), dynamics::Law::published, {});
-  test::expect_rectangular(table);
+  expect_rectangular(table);
   ASSERT_EQ(table.rows.size(), 2u);
   expect_cell(at(table, 0, "fitted to"), "all conditions");
   expect_cell(at(table, 0, "transitions"), 1400);
@@ -224,7 +222,7 @@ TEST(DescribeTables, LawsStandBesideTheMeasuredTrials) {
       {"fast", "coulomb, as given", 1000, summary(5, 5.61, 0.03), 0.33, {0, 0, 0.004}, false, 0.0031, {}});
   comparison.rows.push_back({"fast", "plastic, fitted", 0, {}, 0, {}, true, {}, "no fit"});
   const Table table = laws_table(comparison, {});
-  test::expect_rectangular(table);
+  expect_rectangular(table);
   ASSERT_EQ(table.rows.size(), 3u);
   expect_cell(at(table, 0, "condition"), "fast");
   expect_cell(at(table, 0, "source"), "measured");
@@ -242,4 +240,4 @@ TEST(DescribeTables, LawsStandBesideTheMeasuredTrials) {
 }
 
 }  // namespace
-}  // namespace metastable::reports
+}  // namespace metastable::reports::test

@@ -10,10 +10,8 @@
 #include "reports/description/speed_cells.h"
 #include "tests/reports/cells.h"
 
-namespace metastable::reports {
+namespace metastable::reports::test {
 namespace {
-using test::at;
-using test::expect_cell;
 
 constexpr double t_1 = 12.706204736432095;  // 97.5 % quantile of Student's t, 1 degree of freedom (R: qt(0.975, 1))
 
@@ -119,7 +117,7 @@ std::vector<analysis::Claim> claims() {
 
 TEST(PaperTables, ClaimsHaveOneVerdictAVariant) {
   const Table table = claims_table(claims(), studies(), experiments(), {});
-  test::expect_rectangular(table);
+  expect_rectangular(table);
   ASSERT_EQ(table.rows.size(), 4u);
   expect_cell(at(table, 1, "where"), "Fig. 2");
   expect_cell(at(table, 1, "claim"), "two");
@@ -137,28 +135,28 @@ TEST(PaperTables, ClaimsHaveOneVerdictAVariant) {
 
 TEST(PaperTables, ChangesSayWhatALawOrAReadingChanges) {
   const Table table = changes_table(claims(), studies(), experiments(), {});
-  test::expect_rectangular(table);
+  expect_rectangular(table);
   ASSERT_EQ(table.rows.size(), 4u + 3u);  // the first claim has one verdict throughout
   // Numbers are those of the contact with sds of 0.1: panel 2, run 2 of Fig. 7, run 2 of Fig. 8, mean friction 0.4.
-  const std::size_t speed = test::row_of(table, "steady speed [rad/s]");
+  const std::size_t speed = row_of(table, "steady speed [rad/s]");
   expect_cell(at(table, speed, "published, goes on"), "21.22 (21.13 to 21.31)");
   expect_cell(at(table, speed, "coulomb"), "23.22 (23.13 to 23.31)");
-  const std::size_t rests = test::row_of(table, "trials that rest within 16 collisions");
+  const std::size_t rests = row_of(table, "trials that rest within 16 collisions");
   expect_cell(at(table, rests, "published, goes on"), "cannot");
   expect_cell(at(table, rests, "published, rests"), "0.222");
   expect_cell(at(table, rests, "coulomb"), "0.232");
-  const std::size_t source = test::row_of(table, "largest source of the steady speed's variance (total index)");
+  const std::size_t source = row_of(table, "largest source of the steady speed's variance (total index)");
   expect_cell(at(table, source, "coulomb"), "friction (0.78)");
-  const std::size_t losses = test::row_of(table, "friction's net loss, normal loss [J]");
+  const std::size_t losses = row_of(table, "friction's net loss, normal loss [J]");
   expect_cell(at(table, losses, "published, rests"), "2.201, 2.204");
-  const std::size_t reading = test::row_of(table, "Fig. 2: two"), law = test::row_of(table, "Fig. 3: three");
+  const std::size_t reading = row_of(table, "Fig. 2: two"), law = row_of(table, "Fig. 3: three");
   expect_cell(at(table, reading, "published, goes on"), "reproduced");
   expect_cell(at(table, reading, "published, rests"), "partly");
   expect_cell(at(table, reading, "coulomb"), "partly");
   expect_cell(at(table, reading, "changes with"), "reading");
   expect_cell(at(table, law, "changes with"), "law");
   expect_cell(at(table, law, "settled"), "not reproduced");
-  expect_cell(at(table, test::row_of(table, "Fig. 4: four"), "changes with"), "reading and law");
+  expect_cell(at(table, row_of(table, "Fig. 4: four"), "changes with"), "reading and law");
   EXPECT_NE(table.notes[0].find("the other 1 of 4"), std::string::npos);
 }
 
@@ -178,7 +176,7 @@ TEST(PaperTables, HypothesesAndTheirShares) {
   const std::vector<analysis::Hypothesis> hypotheses{
       {"H1", "launch", {{reproduced, "a"}, {partly, "b"}, {not_reproduced, "c"}, {partly, "d"}}}};
   const Table table = hypotheses_table(hypotheses, studies(), {});
-  test::expect_rectangular(table);
+  expect_rectangular(table);
   expect_cell(at(table, 0, ""), "H1");
   expect_cell(at(table, 0, "hypothesis"), "launch");
   expect_cell(at(table, 0, "published, goes on"), "yes: a");
@@ -189,7 +187,7 @@ TEST(PaperTables, HypothesesAndTheirShares) {
   Studies all = studies();
   all[2].variance[3].shares.steps.group.clear();
   const Table variance = variance_table(all, {});
-  test::expect_rectangular(variance);
+  expect_rectangular(variance);
   ASSERT_EQ(variance.rows.size(), 3u * 2 * 4);  // one law, one set of indices: three laws, two outputs, four frictions
   expect_cell(at(variance, 1, "law"), "published");
   expect_cell(at(variance, 1, "output"), "steady speed [rad/s]");
@@ -212,7 +210,7 @@ TEST(PaperTables, HypothesesAndTheirShares) {
 TEST(PaperTables, Fig4ComparesTheStarts) {
   const Studies all = studies();
   const Table table = fig4_table(all, experiments(), {});
-  test::expect_rectangular(table);
+  expect_rectangular(table);
   ASSERT_EQ(table.rows.size(), 5u);
   expect_cell(at(table, 0, "source"), "stand-in (simulated)");
   const analysis::ConditionComparison c =
@@ -238,7 +236,7 @@ TEST(PaperTables, Fig6AndEqualLegs) {
   all[0].fig6[3].runs[2].measured_legs.steady.clear();  // hardly a trial gets there
   all[0].fig6[3].runs[2].measured_legs.trial_means.clear();
   const Table table = fig6_table(all, {});
-  test::expect_rectangular(table);
+  expect_rectangular(table);
   ASSERT_EQ(table.rows.size(), 16u);
   expect_cell(at(table, 1, "variant"), "published, goes on");
   expect_cell(at(table, 1, "μ"), 0.45);
@@ -259,7 +257,7 @@ TEST(PaperTables, Fig6AndEqualLegs) {
   expect_cell(at(table, 3, "P 2-3 by trial"), "");
 
   const Table legs = equal_legs_table(all, {});
-  test::expect_rectangular(legs);
+  expect_rectangular(legs);
   ASSERT_EQ(legs.rows.size(), 48u);
   expect_cell(at(legs, 4, "variant"), "published, goes on");
   expect_cell(at(legs, 4, "μ"), 0.45);
@@ -275,7 +273,7 @@ TEST(PaperTables, Fig7SpreadsOfBoth) {
   Studies all = studies();
   all[1].fig7[2].runs[0].against_experiment.reset();
   const Table table = fig7_table(all, experiments(), {});
-  test::expect_rectangular(table);
+  expect_rectangular(table);
   ASSERT_EQ(table.rows.size(), 48u);
   const std::size_t row = 12 + 5;  // second variant, second panel, third run
   expect_cell(at(table, row, "variant"), "published, rests");
@@ -291,7 +289,7 @@ TEST(PaperTables, Fig7SpreadsOfBoth) {
 
 TEST(PaperTables, Fig8LossesBesideThePaper) {
   const Table table = fig8_table(studies(), {});
-  test::expect_rectangular(table);
+  expect_rectangular(table);
   ASSERT_EQ(table.rows.size(), 16u);
   expect_cell(at(table, 4, "variant"), "published, rests");
   expect_cell(at(table, 4, "sd of η and μ"), 0.05);
@@ -308,7 +306,7 @@ TEST(PaperTables, Fig8LossesBesideThePaper) {
 
 TEST(PaperTables, Fig9MeansOfBoth) {
   const Table table = fig9_table(studies(), {});
-  test::expect_rectangular(table);
+  expect_rectangular(table);
   ASSERT_EQ(table.rows.size(), 48u);
   const std::size_t row = 24 + 3 * 2 + 1;  // third variant, third panel, second run
   expect_cell(at(table, row, "variant"), "coulomb");
@@ -321,4 +319,4 @@ TEST(PaperTables, Fig9MeansOfBoth) {
 }
 
 }  // namespace
-}  // namespace metastable::reports
+}  // namespace metastable::reports::test

@@ -10,11 +10,9 @@
 
 #include "tests/reports/program.h"
 
-namespace metastable::reports {
+namespace metastable::reports::test {
 namespace {
-using test::metastable;
-using test::read;
-using CoastDownCommand = test::CommandLine;
+using CoastDownCommand = CommandLine;
 
 TEST_F(CoastDownCommand, TakesTheNominalLossOfAnotherFolder) {
   std::string log;
@@ -39,4 +37,4 @@ TEST_F(CoastDownCommand, TakesTheNominalLossOfAnotherFolder) {
 }
 
 }  // namespace
-}  // namespace metastable::reports
+}  // namespace metastable::reports::test

@@ -14,13 +14,11 @@
 #include "reports/experiment_commands/simulate_command.h"
 #include "tests/reports/support.h"
 
-namespace metastable::reports {
+namespace metastable::reports::test {
 namespace {
 namespace fs = std::filesystem;
-using test::printed;
-using test::read;
 
-class CollisionsCommandTest : public test::InFolder {
+class CollisionsCommandTest : public InFolder {
  protected:
   void simulate() const {
     SimulateRequest request;
@@ -112,4 +110,4 @@ TEST_F(CollisionsCommandTest, RefusesSpeedsThatNoWheelKeepsUp) {
 }
 
 }  // namespace
-}  // namespace metastable::reports
+}  // namespace metastable::reports::test

@@ -10,13 +10,11 @@
 #include "reports/experiment_commands/simulate_command.h"
 #include "tests/reports/support.h"
 
-namespace metastable::reports {
+namespace metastable::reports::test {
 namespace {
 namespace fs = std::filesystem;
-using test::printed;
-using test::read;
 
-class DescribeCommandTest : public test::InFolder {
+class DescribeCommandTest : public InFolder {
  protected:
   void SetUp() override {
     InFolder::SetUp();
@@ -80,4 +78,4 @@ TEST_F(DescribeCommandTest, BadFolder) {
 }
 
 }  // namespace
-}  // namespace metastable::reports
+}  // namespace metastable::reports::test

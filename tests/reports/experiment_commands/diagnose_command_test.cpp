@@ -14,13 +14,9 @@
 
 #include "tests/reports/program.h"
 
-namespace metastable::reports {
+namespace metastable::reports::test {
 namespace {
-using test::metastable;
-using test::Ran;
-using test::read;
-using test::with;
-using DiagnoseCommand = test::CommandLine;
+using DiagnoseCommand = CommandLine;
 
 // A small experiment with a leg that grips more gives the same bytes on any number of threads, in every form.
 TEST_F(DiagnoseCommand, FindsWhatTheLaboratoryPutIn) {
@@ -114,4 +110,4 @@ TEST_F(DiagnoseCommand, WrongInputIsOneLineAndCodeTwo) {
 }
 
 }  // namespace
-}  // namespace metastable::reports
+}  // namespace metastable::reports::test

@@ -9,12 +9,9 @@
 
 #include "tests/reports/program.h"
 
-namespace metastable::reports {
+namespace metastable::reports::test {
 namespace {
-using test::metastable;
-using test::Ran;
-using test::read;
-using EffectsCommand = test::CommandLine;
+using EffectsCommand = CommandLine;
 
 TEST_F(EffectsCommand, ListsTheCatalogue) {
   const Ran ran = metastable({"effects", "--json", path("effects.json")});
@@ -32,4 +29,4 @@ TEST_F(EffectsCommand, WrongInputIsOneLineAndCodeTwo) {
 }
 
 }  // namespace
-}  // namespace metastable::reports
+}  // namespace metastable::reports::test

@@ -10,13 +10,11 @@
 #include "reports/experiment_commands/simulate_command.h"
 #include "tests/reports/support.h"
 
-namespace metastable::reports {
+namespace metastable::reports::test {
 namespace {
 namespace fs = std::filesystem;
-using test::printed;
-using test::read;
 
-class LessonsCommandTest : public test::InFolder {};
+class LessonsCommandTest : public InFolder {};
 
 // With few trials and few candidates it has every section, with its tables and figures.
 TEST_F(LessonsCommandTest, WritesEverySection) {
@@ -56,4 +54,4 @@ TEST_F(LessonsCommandTest, WritesNothingWhereTheDataCannotBeRead) {
 }
 
 }  // namespace
-}  // namespace metastable::reports
+}  // namespace metastable::reports::test

@@ -11,12 +11,9 @@
 
 #include "tests/reports/program.h"
 
-namespace metastable::reports {
+namespace metastable::reports::test {
 namespace {
-using test::metastable;
-using test::Ran;
-using test::read;
-using SimulateCommand = test::CommandLine;
+using SimulateCommand = CommandLine;
 
 TEST_F(SimulateCommand, WritesAnExperimentOnce) {
   const std::vector<std::string> words{"simulate", "--trials", "5", "--out", path("trials")};
@@ -66,4 +63,4 @@ TEST_F(SimulateCommand, WrongInputIsOneLineAndCodeTwo) {
 }
 
 }  // namespace
-}  // namespace metastable::reports
+}  // namespace metastable::reports::test

@@ -8,13 +8,11 @@
 #include "analysis/experiment/input_error.h"
 #include "tests/reports/support.h"
 
-namespace metastable::reports {
+namespace metastable::reports::test {
 namespace {
 namespace fs = std::filesystem;
-using test::printed;
-using test::read;
 
-using StudyCommandTest = test::InFolder;
+using StudyCommandTest = InFolder;
 
 TEST_F(StudyCommandTest, WritesThePageAndEveryTableTheSameTwice) {
   for (const char* name : {"one", "two"}) {
@@ -45,4 +43,4 @@ TEST_F(StudyCommandTest, WritesThePageAndEveryTableTheSameTwice) {
 }
 
 }  // namespace
-}  // namespace metastable::reports
+}  // namespace metastable::reports::test

@@ -20,13 +20,11 @@
 #include <matio.h>
 #endif
 
-namespace metastable::reports {
+namespace metastable::reports::test {
 namespace {
 using analysis::Experiment;
 using analysis::MeasuredCollision;
 using analysis::MeasuredTrial;
-using test::metastable;
-using test::Ran;
 using Words = std::vector<std::string>;
 
 // It has two conditions, one trial whose foot turned back, and speeds that are not known.
@@ -58,7 +56,7 @@ constexpr const char* known_collisions =
 constexpr const char* known_trials =
     "condition,trial,outcome\nfast,1,max_collisions\n\"slow, again\",2,rest\nfast,4,rest\n";
 
-class Import : public test::InFolder {
+class Import : public InFolder {
  protected:
   void SetUp() override {
     InFolder::SetUp();
@@ -308,8 +306,8 @@ TEST_F(Import, FramesOfOneTrialBehindAPreamble) {
   ASSERT_EQ(ran.code, 0) << ran.err;
   EXPECT_NE(ran.out.find("assumed: all frames are of one trial\n"), std::string::npos) << ran.out;
   EXPECT_NE(ran.out.find("  time         Frame in 1/120 s\n"), std::string::npos) << ran.out;
-  EXPECT_NE(test::read(folder_ / "out/angle.csv").find("\n1,0.025,0.1308"), std::string::npos)
-      << test::read(folder_ / "out/angle.csv");
+  EXPECT_NE(read(folder_ / "out/angle.csv").find("\n1,0.025,0.1308"), std::string::npos)
+      << read(folder_ / "out/angle.csv");
 }
 
 TEST_F(Import, AnglesOfACamera) {
@@ -318,7 +316,7 @@ TEST_F(Import, AnglesOfACamera) {
   const Ran ran = import({file("angle.csv", csv), "--columns", "time=frame_ms,angle=phi_deg"});
   ASSERT_EQ(ran.code, 0) << ran.err;
   EXPECT_NE(ran.out.find("next: metastable collisions"), std::string::npos) << ran.out;
-  EXPECT_NE(test::read(folder_ / "out/angle.csv").find("\nfast,1,0.01,0.05235987755982989\n"), std::string::npos);
+  EXPECT_NE(read(folder_ / "out/angle.csv").find("\nfast,1,0.01,0.05235987755982989\n"), std::string::npos);
 }
 
 TEST_F(Import, HelpTellsWhatItNeeds) {
@@ -508,7 +506,7 @@ TEST_F(ImportMat, Hdf5OfOtherPrograms) {
                        "--description", one, "--out", path("out")});
   };
   expect_same(run(mat), 1e-15);
-  const std::string whole = test::read(mat);
+  const std::string whole = read(mat);
   for (std::size_t k = 0; k < 60; ++k) {
     std::string spoilt = whole;
     if (k % 3 == 0)
@@ -530,13 +528,13 @@ TEST_F(ImportMat, CutShortOrDamagedIsRefused) {
     EXPECT_EQ(ran.code, 2);
     return ran.err.substr(0, ran.err.find(" at byte"));
   };
-  const std::string whole = test::read(save({matrix(true)}));
+  const std::string whole = read(save({matrix(true)}));
   const std::string begin = "metastable: " + path("broken.mat");
   EXPECT_EQ(refusal_of("MATLAB 5.0 MAT-file, not really"), begin + ": is cut short: what begins");
   for (const std::size_t size : {whole.size() - 1, whole.size() - 40, std::size_t{140}, std::size_t{131}})
     EXPECT_EQ(refusal_of(whole.substr(0, size)), begin + ": is cut short: what begins") << size;
   compression_ = MAT_COMPRESSION_ZLIB;
-  std::string compressed = test::read(save({matrix(true)}));
+  std::string compressed = read(save({matrix(true)}));
   EXPECT_EQ(refusal_of(compressed.substr(0, compressed.size() - 1)), begin + ": is cut short: what begins");
   compressed[compressed.size() - 12] ^= 1;
   EXPECT_EQ(refusal_of(compressed), begin + ": is damaged: its variable");
@@ -555,4 +553,4 @@ TEST_F(Import, WithoutTheLibrarySaysWhatToInstall) {
 #endif
 
 }  // namespace
-}  // namespace metastable::reports
+}  // namespace metastable::reports::test

@@ -7,11 +7,8 @@
 
 #include "tests/reports/cells.h"
 
-namespace metastable::reports {
+namespace metastable::reports::test {
 namespace {
-using test::at;
-using test::expect_cell;
-using test::row_of;
 
 constexpr double infinity = std::numeric_limits<double>::infinity();
 
@@ -50,7 +47,7 @@ TEST(ReportTables, RampsHaveARowForEachAnswer) {
   endless.study.violations.clear();
   endless.thresholds = {};
   const Table table = ramps_table({studied(), endless}, {});
-  test::expect_rectangular(table);
+  expect_rectangular(table);
   const auto value = [&](const char* quantity) { return at(table, row_of(table, quantity), "published, 9.59 deg"); };
   const auto other = [&](const char* quantity) { return at(table, row_of(table, quantity), "coulomb, 7.02 deg"); };
   expect_cell(value("expected steps before failure, from the launch"), Estimate{11, 10.5, 11.5});
@@ -145,7 +142,7 @@ TEST(ReportTables, SensitivitiesStandSideBySideAndOnlySureOnesAreTold) {
   EXPECT_EQ(sensitivity_sentence(settled),
             "1 % more mean of friction μ makes 7.3 % more steps, 1 % more sd of friction μ makes 1.8 % fewer steps");
   const Table table = sensitivity_table("hangs-on", {settled, published}, {});
-  test::expect_rectangular(table);
+  expect_rectangular(table);
   ASSERT_EQ(table.rows.size(), 4u);
   expect_cell(at(table, 0, "value"), 0.4);
   EXPECT_NEAR(std::get<Estimate>(at(table, 0, "steps under settled").value()).value, 7.25, 0.01);
@@ -162,7 +159,7 @@ TEST(ReportTables, GridsRunRowByRow) {
   }
   const Table table = grid_table("grid", "a grid", {analysis::Parameter::slope, {7, 8}},
                                  {analysis::Parameter::friction_mean, {0.2, 0.3, 0.4}}, cells, {});
-  test::expect_rectangular(table);
+  expect_rectangular(table);
   ASSERT_EQ(table.rows.size(), 2u);
   const std::string down(analysis::parameter_label(analysis::Parameter::slope)),
       across(analysis::parameter_label(analysis::Parameter::friction_mean));
@@ -180,7 +177,7 @@ TEST(ReportTables, EnergyLossesStandBesideThePaper) {
                                     {{0.091, 0.112, 0.005}, {0.141, 0.084, 0.006}, 1600}},
                                    dynamics::Law::published, {});
   EXPECT_NE(table.title.find("under published"), std::string::npos);
-  test::expect_rectangular(table);
+  expect_rectangular(table);
   ASSERT_EQ(table.rows.size(), 3u);
   expect_cell(at(table, 0, "sd of η and μ"), 0.05);
   expect_cell(at(table, 0, "tangential net mean"), with_error(0.066, 0.001));
@@ -201,4 +198,4 @@ TEST(ReportTables, EnergyLossesStandBesideThePaper) {
 }
 
 }  // namespace
-}  // namespace metastable::reports
+}  // namespace metastable::reports::test
