@@ -133,7 +133,7 @@ Diagnosis::Data described_data(const TransitionModel& model) {
   Diagnosis::Data data;
   data.trials = model.trials();
   data.events = model.events().size();
-  for (const Event& e : model.events()) data.collisions += e.kind == EventKind::collision || e.kind == EventKind::step;
+  for (std::size_t i = 0; i < model.events().size(); ++i) data.collisions += begins_step(model.events(), i);
   for (std::size_t c = 0; c < model.conditions(); ++c) data.condition_names.push_back(model.condition_name(c));
   data.notes = model.notes();
   data.accepted_defects = model.accepted_defects();

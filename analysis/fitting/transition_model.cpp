@@ -3,6 +3,7 @@
 #include <cmath>
 #include <numeric>
 #include <stdexcept>
+#include <string>
 #include <utility>
 
 namespace metastable::analysis {
@@ -19,6 +20,16 @@ double Nuisance::information(double value) const {
   const double belief = misstated > 0 ? stated / (stated + misstated) : 1;  // that it was stated rightly
   return belief / (prior_sd * prior_sd);
 }
+
+bool begins_step(const std::vector<Event>& events, std::size_t event) {
+  const auto is_step = [](const Event& e) { return e.kind == EventKind::collision || e.kind == EventKind::step; };
+  const Event& here = events[event];
+  if (!is_step(here) || event == 0) return is_step(here);
+  const Event& before = events[event - 1];
+  return !is_step(before) || before.trial != here.trial || before.number != here.number;
+}
+
+std::string TransitionModel::leg_word(int leg) const { return "leg " + std::to_string(leg); }
 
 double Evaluation::total() const { return std::accumulate(log_density.begin(), log_density.end(), 0.0); }
 

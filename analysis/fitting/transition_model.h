@@ -27,6 +27,11 @@ inline bool is_stance(EventKind kind) { return kind == EventKind::stance; }
 /// Says whether it is a collision, with its stance or alone, or what came of one: rest, survival.
 inline bool is_contact(EventKind kind) { return kind != EventKind::stance && kind != EventKind::launch; }
 
+/// A column of what was measured; its unit may be unknown.
+struct ObservedColumn {
+  std::string name, unit;
+};
+
 /// One observed transition and its place in the experiment. The list of a data set does not depend on parameters.
 struct Event {
   EventKind kind = EventKind::step;
@@ -38,8 +43,12 @@ struct Event {
   std::optional<double> since_previous = {};  ///< collision [s]; none where it may not judge
   double speed = 0;                           ///< given, the condition of the density [rad/s]
   std::optional<bool> rested = {};            ///< after this collision; none: not known, or no collision
+  std::size_t column = 0;                     ///< which of TransitionModel::columns() was observed
   double added = 0;                           ///< known part of the measurement error, in the observed speed [rad/s]
 };
+
+/// Says whether an event is the first that is observed of a collision or step.
+bool begins_step(const std::vector<Event>& events, std::size_t event);
 
 /// Holds the logarithm of each event's density [events] and the normal score of its probability integral transform,
 /// independent and standard normal if the model is right. The score of a `survival` is 0.
@@ -149,6 +158,11 @@ class TransitionModel {
   virtual std::string condition_name(std::size_t condition) const = 0;
   /// Names one of the steps that a speed is observed of, in the singular.
   virtual std::string step_name() const { return "step"; }
+  /// Names what is observed of a step; Event::column is its index.
+  virtual std::vector<ObservedColumn> columns() const { return {{"speed", "rad/s"}}; }
+  /// Names what Event::leg is the number of, and says which one.
+  virtual std::string leg_name() const { return "leg"; }
+  virtual std::string leg_word(int leg) const;
   /// Names the unit in which Event::position is measured.
   virtual std::string position_unit() const { return "m"; }
   /// Says what a recalibration refits, in words that "remove" can follow.

@@ -33,7 +33,7 @@ using Sums = std::vector<std::vector<Sum>>;  // by condition and collision
 void gather(const TransitionModel& model, Sums& sums) {
   const Event* previous = nullptr;
   for (const Event& e : model.events()) {
-    if (!is_contact(e.kind) || e.number > longest_profile) continue;
+    if (!is_contact(e.kind) || e.column > 0 || e.number > longest_profile || !std::isfinite(e.speed)) continue;
     if (previous && previous->trial == e.trial && previous->number == e.number) continue;
     previous = &e;
     std::vector<Sum>& of = sums[e.condition];

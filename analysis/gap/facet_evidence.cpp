@@ -30,12 +30,8 @@ using Facets = std::map<Key, std::vector<MapColumn>>;
 // Gathers columns of the scores of one phase: contrasts of means, and products with earlier scores.
 class Gatherer {
  public:
-  Gatherer(const TransitionModel& model, const std::vector<EventResidual>& left, bool stance)
-      : model_(model), left_(left) {
-    for (std::size_t i = 0; i < model.events().size(); ++i)
-      if (stance ? is_stance(model.events()[i].kind) : is_contact(model.events()[i].kind)) members_.push_back(i);
-    stance_ = stance;
-  }
+  Gatherer(const TransitionModel& model, const std::vector<EventResidual>& left, const EventPhase& phase)
+      : model_(model), left_(left), members_(phase.members), stance_(phase.stance) {}
 
   template <class Weight>  // of an event; 0 leaves it out
   void contrast(Facets& facets, const char* facet, Weight weight) const {
@@ -64,6 +60,7 @@ class Gatherer {
     for (std::size_t k = 1; k < members_.size(); ++k)
       if (trial(k - 1) == trial(k)) {
         const double change = speed(k - 1) - speed(k);
+        if (!std::isfinite(change)) continue;
         column.terms.emplace_back(members_[k], change * left_[members_[k]].mean);
         column.variance += change * change;
       }
@@ -81,8 +78,9 @@ class Gatherer {
 };
 
 // Adds facets that the map lacks.
-void add_unmapped(Facets& facets, const TransitionModel& model, const std::vector<EventResidual>& left, bool stance) {
-  const Gatherer gather(model, left, stance);
+void add_unmapped(Facets& facets, const TransitionModel& model, const std::vector<EventResidual>& left,
+                  const EventPhase& phase) {
+  const Gatherer gather(model, left, phase);
   const double trials = static_cast<double>(model.trials());
   double longest = 1;
   for (const Event& e : model.events()) longest = std::max(longest, static_cast<double>(e.number));
@@ -151,7 +149,7 @@ std::vector<LeftInFacet> left_by_facet(const TransitionModel& model, const Fit& 
       facets[{memory ? cell.at : cell.facet, cell.aspect, cell.stance}].push_back(std::move(mapped.columns[c]));
     }
   const std::vector<EventResidual> left = residuals(model, fit.evaluation);
-  for (const bool stance : {false, true}) add_unmapped(facets, model, left, stance);
+  for (const EventPhase& phase : event_phases(model)) add_unmapped(facets, model, left, phase);
 
   std::vector<LeftInFacet> all;
   for (const auto& [key, columns] : facets) {

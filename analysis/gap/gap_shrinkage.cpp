@@ -217,7 +217,7 @@ HeldOutGap gap_shrinkage(const TransitionModel& model, const Fit& given, const F
       const Event& event = model.events()[i];
       HeldOut& out = held[event.trial];
       const bool speed = event.kind == EventKind::collision || event.kind == EventKind::step;
-      out.collisions += speed;
+      out.collisions += begins_step(model.events(), i);
       for (std::size_t m = 0; m < 3; ++m) out.log_score[m] += models[m]->log_density[i];
       const double shift = flexible.predicted[at];
       out.flexible += flexible.bounded[at] * shift - 0.5 * shift * shift;
@@ -233,15 +233,19 @@ HeldOutGap gap_shrinkage(const TransitionModel& model, const Fit& given, const F
   HeldOutGap result;
   for (const HeldOut& h : held) result.gap.push_back(h.log_score[2] + h.flexible - h.log_score[0] - h.flexible_floor);
   std::vector<Shrinkage>& all = result.measures;
-  all.push_back(summarise(held, seed, "held-out log score per collision", "nats", [](const HeldOut& h, double* v) {
-    const double best = h.log_score[2] + h.flexible;
-    for (int m = 0; m < 3; ++m) v[m] = best - h.log_score[m] - h.flexible_floor;
-    v[3] = 0;
-  }));
-  all.push_back(summarise(held, seed, "held-out CRPS of the next speed", "rad/s", [](const HeldOut& h, double* v) {
-    for (int m = 0; m < 3; ++m) v[m] = h.crps[m];
-    v[3] = h.crps_floor;
-  }));
+  const std::vector<ObservedColumn> columns = model.columns();
+  all.push_back(
+      summarise(held, seed, "held-out log score per " + model.step_name(), "nats", [](const HeldOut& h, double* v) {
+        const double best = h.log_score[2] + h.flexible;
+        for (int m = 0; m < 3; ++m) v[m] = best - h.log_score[m] - h.flexible_floor;
+        v[3] = 0;
+      }));
+  if (columns.size() > 1) return result;  // columns of several units have no mean distance
+  all.push_back(summarise(held, seed, "held-out CRPS of the next " + columns[0].name, columns[0].unit,
+                          [](const HeldOut& h, double* v) {
+                            for (int m = 0; m < 3; ++m) v[m] = h.crps[m];
+                            v[3] = h.crps_floor;
+                          }));
   return result;
 }
 

@@ -34,8 +34,7 @@ class Cutter {
   std::vector<MapCell> cells() {
     const auto& events = model_.events();
     two_phases_ = std::any_of(events.begin(), events.end(), [](const Event& e) { return is_stance(e.kind); });
-    cut_phase(false);
-    if (two_phases_) cut_phase(true);
+    for (const EventPhase& phase : event_phases(model_)) cut_phase(phase);
     std::vector<std::size_t> launches;
     for (std::size_t i = 0; i < events.size(); ++i)
       if (events[i].kind == EventKind::launch) launches.push_back(i);
@@ -44,49 +43,47 @@ class Cutter {
   }
 
  private:
-  void cut_phase(bool stance) {
-    const auto& events = model_.events();
-    std::vector<std::size_t> members;
-    for (std::size_t i = 0; i < events.size(); ++i)
-      if (stance ? is_stance(events[i].kind) : is_contact(events[i].kind)) members.push_back(i);
+  void cut_phase(const EventPhase& phase) {
+    const auto& [stance, column, members, where] = phase;
     if (members.size() < least_cell_events) return;
     const std::size_t first = cells_.size();
-    const std::string where = !two_phases_ ? "" : stance ? ", stance" : ", collision";
-    ranges("speed", members, where, 5, "rad/s", [](const Event& e) { return std::optional(e.speed); });
-    groups("leg", members, where, [](const Event& e) {
-      return e.leg ? std::optional(std::pair{*e.leg, fmt::format("leg {}", *e.leg)}) : std::nullopt;
+    const ObservedColumn observed = model_.columns()[column];
+    const std::string step = model_.step_name();
+    ranges(observed.name, members, where, 5, observed.unit,
+           [](const Event& e) { return std::isfinite(e.speed) ? std::optional(e.speed) : std::nullopt; });
+    groups(model_.leg_name(), members, where, [this](const Event& e) {
+      return e.leg ? std::optional(std::pair{*e.leg, model_.leg_word(*e.leg)}) : std::nullopt;
     });
     ranges("position", members, where, 6, model_.position_unit(),
            [](const Event& e) { return std::optional(e.position); });
-    groups("collision", members, where, [](const Event& e) { return collisions(e.number); });
+    groups(step, members, where, [&](const Event& e) { return numbers(step, e.number); });
     ranges("trial", members, where, 6, "",
            [](const Event& e) { return std::optional(static_cast<double>(e.trial + 1)); });
     if (model_.trials() > 2) trend(members, where);
-    ranges("time", members, where, 5, "s since the previous collision",
-           [](const Event& e) { return e.since_previous; });
+    ranges("time", members, where, 5, "s since the previous " + step, [](const Event& e) { return e.since_previous; });
     if (!stance && model_.time_tells()) swings(members, where);
     if (model_.conditions() > 1)
       groups("condition", members, where, [this](const Event& e) {
         return std::optional(std::pair{static_cast<int>(e.condition), model_.condition_name(e.condition)});
       });
-    cells_.push_back({"phase", !two_phases_ ? "step" : stance ? "stance" : "collision", members, stance});
+    cells_.push_back({"phase", stance ? "stance" : two_phases_ ? "collision" : "step" + where, members, stance});
     for (std::size_t c = first; c < cells_.size(); ++c) cells_[c].stance = stance;
   }
   // Groups are collisions 1, 2, 3 to 4, ..., 13 to 16, and those from 17.
-  static std::optional<std::pair<int, std::string>> collisions(int number) {
+  static std::optional<std::pair<int, std::string>> numbers(const std::string& step, int number) {
     static constexpr std::array ends{1, 2, 4, 8, 12, 16};
     int from = 1;
     for (std::size_t i = 0; i < ends.size(); ++i) {
       if (number <= ends[i])
-        return std::pair{static_cast<int>(i), from == ends[i] ? fmt::format("collision {}", from)
-                                                              : fmt::format("collisions {} to {}", from, ends[i])};
+        return std::pair{static_cast<int>(i), from == ends[i] ? fmt::format("{} {}", step, from)
+                                                              : fmt::format("{}s {} to {}", step, from, ends[i])};
       from = ends[i] + 1;
     }
-    return std::pair{static_cast<int>(ends.size()), fmt::format("collisions from {}", from)};
+    return std::pair{static_cast<int>(ends.size()), fmt::format("{}s from {}", step, from)};
   }
 
   template <class Key>
-  void groups(const char* facet, const std::vector<std::size_t>& members, const std::string& where, Key key) {
+  void groups(const std::string& facet, const std::vector<std::size_t>& members, const std::string& where, Key key) {
     std::map<int, MapCell> found;
     for (const std::size_t i : members)
       if (const auto k = key(model_.events()[i])) {
@@ -100,7 +97,7 @@ class Cutter {
       if (cell.events.size() >= least_cell_events) cells_.push_back(std::move(cell));
   }
   template <class Value>
-  void ranges(const char* facet, const std::vector<std::size_t>& members, const std::string& where, int parts,
+  void ranges(const std::string& facet, const std::vector<std::size_t>& members, const std::string& where, int parts,
               const std::string& unit, Value value) {
     std::vector<double> all;
     for (const std::size_t i : members)
@@ -161,6 +158,24 @@ class Cutter {
 };
 
 }  // namespace
+
+std::vector<EventPhase> event_phases(const TransitionModel& model) {
+  const auto& events = model.events();
+  const std::vector<ObservedColumn> columns = model.columns();
+  const bool two = std::ranges::any_of(events, [](const Event& e) { return is_stance(e.kind); });
+  std::vector<EventPhase> all;
+  for (const bool stance : {false, true})
+    for (std::size_t c = 0; c < columns.size(); ++c) {
+      EventPhase phase{.stance = stance, .column = c};
+      for (std::size_t i = 0; i < events.size(); ++i)
+        if (events[i].column == c && (stance ? is_stance(events[i].kind) : is_contact(events[i].kind)))
+          phase.members.push_back(i);
+      if (two) phase.where = stance ? ", stance" : ", collision";
+      if (columns.size() > 1) phase.where += ", " + columns[c].name;
+      if (!phase.members.empty()) all.push_back(std::move(phase));
+    }
+  return all;
+}
 
 std::vector<MapCell> map_cells(const TransitionModel& model) { return Cutter(model).cells(); }
 

@@ -21,6 +21,15 @@ struct MapCell {
   bool swing = false;                    ///< cosine or sine of the time since the previous collision
 };
 
+/// Events that are looked at together: collisions with what came of them, or stances, of one observed column.
+struct EventPhase {
+  bool stance = false;
+  std::size_t column = 0;
+  std::vector<std::size_t> members = {};  ///< events
+  std::string where = {};                 ///< ", stance", where it has to be said; else empty
+};
+std::vector<EventPhase> event_phases(const TransitionModel& model);
+
 /// Cuts the model's events by speed, leg, position, collision, trial, time and condition, each phase by itself; trends
 /// over the trials; and swings where time_tells(). Phases, and cells of a facet, with too few events have none.
 std::vector<MapCell> map_cells(const TransitionModel& model);

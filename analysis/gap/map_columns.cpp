@@ -33,23 +33,25 @@ EventResidual residual(EventKind kind, double score, double log_density) {
   return {-density * weight, -edge * density * weight / std::numbers::sqrt2, (beyond - share_beyond * chance) * weight};
 }
 
-EventKind phase_of(EventKind kind) { return is_contact(kind) ? EventKind::collision : kind; }
+using UnitKey = std::pair<EventKind, std::size_t>;  // phase and column
 
-// Returns [rad/s] by phase, contacts as collisions, what a unit of score is in the middle of its distribution. Where a
-// cell's events are far out it is more there, and would exaggerate the shift that brought them out. Where none is in
-// the middle it is the usual one.
-std::map<EventKind, double> units_of_score(const std::vector<Event>& events, const Evaluation& evaluation) {
-  std::map<EventKind, std::pair<double, double>> sums;  // and their number
-  std::map<EventKind, std::vector<double>> all;
+UnitKey phase_of(const Event& e) { return {is_contact(e.kind) ? EventKind::collision : e.kind, e.column}; }
+
+// Returns, in units of the column, by phase, contacts as collisions, what a unit of score is in the middle of its
+// distribution. Where a cell's events are far out it is more there, and would exaggerate the shift that brought them
+// out. Where none is in the middle it is the usual one.
+std::map<UnitKey, double> units_of_score(const std::vector<Event>& events, const Evaluation& evaluation) {
+  std::map<UnitKey, std::pair<double, double>> sums;  // and their number
+  std::map<UnitKey, std::vector<double>> all;
   for (std::size_t i = 0; i < events.size(); ++i) {
-    all[phase_of(events[i].kind)].push_back(evaluation.unit[i]);
+    all[phase_of(events[i])].push_back(evaluation.unit[i]);
     if (std::abs(evaluation.score[i]) < central_score) {
-      auto& [sum, number] = sums[phase_of(events[i].kind)];
+      auto& [sum, number] = sums[phase_of(events[i])];
       sum += evaluation.unit[i];
       ++number;
     }
   }
-  std::map<EventKind, double> units;
+  std::map<UnitKey, double> units;
   for (auto& [phase, some] : all) units[phase] = median(std::move(some));
   for (const auto& [phase, sum] : sums) units[phase] = sum.first / sum.second;
   return units;
@@ -57,19 +59,22 @@ std::map<EventKind, double> units_of_score(const std::vector<Event>& events, con
 
 // Adds mean, spread and, of whole phases, tail share of every cell; contrasts have a mean only.
 void add_cells(MapColumns& all, const TransitionModel& model, const std::vector<EventResidual>& residuals,
-               const std::map<EventKind, double>& units) {
+               const std::map<UnitKey, double>& units) {
+  const std::vector<ObservedColumn> columns = model.columns();
   const double share_beyond = 2 * dynamics::normal_cdf(-tail_score);
   for (const MapCell& cell : map_cells(model)) {
     const auto n = static_cast<double>(cell.events.size());
-    const auto unit = units.find(phase_of(model.events()[cell.events.front()].kind));
-    const double in_speed = unit != units.end() ? unit->second : 1;  // [rad/s] of a score of one
+    const Event& one = model.events()[cell.events.front()];
+    const auto unit = units.find(phase_of(one));
+    const double in_speed = unit != units.end() ? unit->second : 1;  // of a score of one, in the column's unit
+    const std::string& word = columns[one.column].unit.empty() ? columns[one.column].name : columns[one.column].unit;
     if (!cell.weights.empty()) {
       MapColumn weighted{Measure::shift, {}, 0, cell.weights};
       for (std::size_t k = 0; k < cell.events.size(); ++k) {
         weighted.terms.emplace_back(cell.events[k], cell.weights[k] * residuals[cell.events[k]].mean);
         weighted.variance += cell.weights[k] * cell.weights[k];
       }
-      all.add(cell, "mean", "rad/s", in_speed, std::move(weighted));
+      all.add(cell, "mean", word, in_speed, std::move(weighted));
       continue;
     }
     MapColumn mean{Measure::shift, {}, n, {}}, spread{Measure::spread, {}, n, {}};
@@ -81,7 +86,7 @@ void add_cells(MapColumns& all, const TransitionModel& model, const std::vector<
       tail.terms.emplace_back(i, residuals[i].tail);
       beyond += residuals[i].tail;
     }
-    all.add(cell, "mean", "rad/s", in_speed, std::move(mean));  // the size follows with the statistic
+    all.add(cell, "mean", word, in_speed, std::move(mean));  // the size follows with the statistic
     all.add(cell, "spread", "of the model's", 0, std::move(spread));
     if (cell.facet == "phase") all.add(cell, "tail", "share", beyond / n, std::move(tail));
   }
@@ -89,11 +94,12 @@ void add_cells(MapColumns& all, const TransitionModel& model, const std::vector<
 
 // Adds memory: successive scores of a trial; and trials that differ as a whole. It goes by correlation, so that a model
 // far off does not pass for either.
-void add_memory(MapColumns& all, const std::vector<Event>& events, const std::vector<EventResidual>& residuals,
-                bool stance) {
-  std::vector<std::size_t> members;
-  for (std::size_t i = 0; i < events.size(); ++i)
-    if (stance ? is_stance(events[i].kind) : is_contact(events[i].kind)) members.push_back(i);
+void add_memory(MapColumns& all, const TransitionModel& model, const std::vector<EventResidual>& residuals,
+                const EventPhase& phase) {
+  const std::vector<Event>& events = model.events();
+  const std::vector<std::size_t>& members = phase.members;
+  const bool stance = phase.stance;
+  const std::string column = model.columns().size() > 1 ? phase.where : "";
   double middle = 0, square = 0;
   for (const std::size_t i : members) {
     middle += residuals[i].mean / static_cast<double>(members.size());
@@ -101,8 +107,9 @@ void add_memory(MapColumns& all, const std::vector<Event>& events, const std::ve
   }
   const double sd = std::sqrt(std::max(1.0, square - middle * middle));
   MapColumn memory{Measure::correlation, {}, 0, {}}, whole{Measure::correlation, {}, 0, {}};
-  MapCell successive{"collision", stance ? "successive stances" : "successive collisions", {}, stance};
-  MapCell trials{"trial", stance ? "trials as a whole, stance" : "trials as a whole", {}, stance};
+  MapCell successive{
+      model.step_name(), "successive " + (stance ? "stance" : model.step_name()) + "s" + column, {}, stance};
+  MapCell trials{"trial", (stance ? "trials as a whole, stance" : "trials as a whole") + column, {}, stance};
   double sum = 0, between = 0, pairs = 0, in_trial = 0, partial = 0, before = 0;
   std::optional<std::size_t> previous;
   for (const std::size_t i : members) {
@@ -154,7 +161,8 @@ void add_rests(MapColumns& all, const TransitionModel& model, const Fit& fit) {
       column.variance += chance_of_rest[i] * (1 - chance_of_rest[i]);
     }
     if (std::max(expected, rests) < least_rests) continue;
-    all.add(cell, "mean", "share of collisions", excess / static_cast<double>(cell.events.size()), std::move(column));
+    all.add(cell, "mean", "share of " + model.step_name() + "s", excess / static_cast<double>(cell.events.size()),
+            std::move(column));
   }
 }
 
@@ -171,7 +179,7 @@ MapColumns map_columns(const TransitionModel& model, const Fit& fit) {
   const std::vector<EventResidual> left = residuals(model, fit.evaluation);
   MapColumns all;
   add_cells(all, model, left, units_of_score(model.events(), fit.evaluation));
-  for (const bool stance : {false, true}) add_memory(all, model.events(), left, stance);
+  for (const EventPhase& phase : event_phases(model)) add_memory(all, model, left, phase);
   add_rests(all, model, fit);
   return all;
 }

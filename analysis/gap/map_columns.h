@@ -38,7 +38,7 @@ struct MapColumns {
   std::vector<GapCell> cells;
   std::vector<MapColumn> columns;
 
-  void add(const MapCell& cell, const char* aspect, const char* unit, double size, MapColumn column) {
+  void add(const MapCell& cell, const char* aspect, const std::string& unit, double size, MapColumn column) {
     GapCell out;
     out.facet = cell.facet;
     out.aspect = aspect;

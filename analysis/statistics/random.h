@@ -20,7 +20,8 @@ enum class DrawStream : std::uint64_t {
   held_out_weights = 3,   ///< weights of held-out trials
   folds = 4,              ///< the order in which trials go to folds
   blur = 5,               ///< errors added to speeds that are more exact than the law
-  steps = 6               ///< parameters of a fit, for its expected steps
+  steps = 6,              ///< parameters of a fit, for its expected steps
+  machine = 7             ///< runs of a machine
 };
 
 /// Returns the standard normals by which a bootstrap multiplies scores: those of draw number `draw`.

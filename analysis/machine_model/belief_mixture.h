@@ -1,0 +1,52 @@
+#pragma once
+// What is believed of a machine's state: a mixture of normals that measured values sharpen one by one.
+
+#include <Eigen/Core>
+#include <vector>
+
+namespace metastable::analysis {
+
+/// What a measured value is of: weights over the state, and the variance of its error.
+struct Look {
+  Eigen::VectorXd weights;
+  double offset = 0;  ///< what is seen is so much more
+  double variance = 0;
+};
+
+/// How likely a measured value was.
+struct SeenValue {
+  double log_density = 0;
+  double score = 0;  ///< normal score of its probability integral transform
+  double unit = 1;   ///< change of the value per unit of score, there
+};
+
+/// Holds normals with weights that add up to the probability that the machine goes on.
+class BeliefMixture {
+ public:
+  struct Part {
+    double log_weight = 0;
+    Eigen::VectorXd mean;
+    Eigen::MatrixXd covariance;
+    double width = 1;  ///< above 1: a value is seen so many times as far off, and tells nothing of this part
+  };
+
+  std::vector<Part>& parts() { return parts_; }
+  /// Adds a part of this share in which the state, the first `states` numbers, went `width` times as far off.
+  void add_outlier(double share, double width, Eigen::Index states);
+  /// Adds a part of this share with the mixture's own moments, in which what is seen spreads `width` times as far and
+  /// tells nothing; the others give way to it.
+  void add_wild(double share, double width);
+  /// Sharpens the belief by a value; weights then add up to 1.
+  /// @param failed  probability that the machine failed instead: it counts as a value below all
+  SeenValue see(const Look& look, double value, double failed);
+  /// Returns the one normal with the mixture's mean and covariance.
+  Part collapsed() const;
+
+ private:
+  double log_mass() const;
+  Part& give_way(double share);
+
+  std::vector<Part> parts_;
+};
+
+}  // namespace metastable::analysis

@@ -1,0 +1,316 @@
+#include "analysis/machine_model/belief_step.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <utility>
+
+namespace metastable::analysis {
+namespace {
+
+constexpr double reach = 1.7320508075688772;  // points at sqrt 3 sds have the normal's fourth moment
+constexpr double bend_share = 1.0 / 18;       // (h^2 - 1) / (4 h^4) with h^2 = 3
+constexpr double rounding = 1e-14;            // of a variance
+constexpr int halvings = 30;                  // of a lattice's cell, to the edge of failure
+constexpr double least_weight = 1e-10;        // of a cell that counts
+constexpr double infinite = std::numeric_limits<double>::infinity();
+
+// Returns the lower root L of L L^T = covariance, with zero columns where there is no variance of its own.
+Eigen::MatrixXd root_of(const Eigen::MatrixXd& covariance) {
+  const Eigen::Index n = covariance.rows();
+  Eigen::MatrixXd root = Eigen::MatrixXd::Zero(n, n);
+  for (Eigen::Index j = 0; j < n; ++j) {
+    const double pivot = covariance(j, j) - root.row(j).head(j).squaredNorm();
+    if (!(pivot > rounding * covariance(j, j))) continue;
+    root(j, j) = std::sqrt(pivot);
+    for (Eigen::Index i = j + 1; i < n; ++i)
+      root(i, j) = (covariance(i, j) - root.row(i).head(j).dot(root.row(j).head(j))) / root(j, j);
+  }
+  return root;
+}
+
+}  // namespace
+
+// First and second differences of the next state, in one trial.
+struct BeliefStep::Slopes {
+  Eigen::VectorXd centre;                 // next state of the mean, scores at zero
+  Eigen::MatrixXd first, bend;            // [states x (used columns, straight scores)]: slope, f+ - 2 f0 + f-
+  std::vector<Eigen::MatrixXd> by_score;  // by lattice score: change of `first` a unit of it
+};
+
+// One cell of the lattice, in one trial.
+struct BeliefStep::Cell {
+  double weight = 0, dead = 0;     // of the part that goes on, and of the one that fails
+  std::size_t anchor = 0;          // the point of the lattice from which its next state is taken
+  std::vector<CellPart> by_score;  // mean and variance, by lattice score
+};
+
+BeliefStep::BeliefStep(MachineStepper& stepper, const ScorePlan& plan, std::size_t shared)
+    : stepper_(stepper), plan_(plan), shared_(shared) {
+  if (!plan_.lattice.empty()) axis_ = lattice_axis(static_cast<int>(plan_.lattice.size()));
+  if (plan_.failing && plan_.lattice.front() != *plan_.failing) std::swap(plan_.lattice.front(), plan_.lattice.back());
+  for (std::size_t m = 0; m < stepper_.scores(); ++m)
+    if (std::ranges::find(plan_.lattice, m) == plan_.lattice.end()) straight_.push_back(m);
+}
+
+std::size_t BeliefStep::lattice_points() const {
+  std::size_t count = plan_.lattice.empty() ? 0 : 1;
+  for (std::size_t b = 0; b < plan_.lattice.size(); ++b) count *= axis_.points.size();
+  return count;
+}
+
+// The first score of the lattice runs fastest.
+Eigen::VectorXd BeliefStep::lattice_scores(std::size_t point) const {
+  Eigen::VectorXd fresh = Eigen::VectorXd::Zero(static_cast<Eigen::Index>(stepper_.scores()));
+  for (const std::size_t score : plan_.lattice) {
+    fresh[static_cast<Eigen::Index>(score)] = axis_.points[point % axis_.points.size()];
+    point /= axis_.points.size();
+  }
+  return fresh;
+}
+
+// The centre, pairs along the root and the straight scores, the lattice, and pairs at both ends of each of its scores.
+void BeliefStep::add_points(const TransitionPlace& place, const BeliefMixture::Part& belief,
+                            const Eigen::MatrixXd& root) {
+  const Eigen::VectorXd mean = belief.mean.head(size());
+  const Eigen::VectorXd still = Eigen::VectorXd::Zero(static_cast<Eigen::Index>(stepper_.scores()));
+  const auto unit = [&](std::size_t score) {
+    return Eigen::VectorXd(Eigen::VectorXd::Unit(still.size(), static_cast<Eigen::Index>(score)));
+  };
+  stepper_.add(place, mean, still);
+  const auto add_pairs = [&](const Eigen::VectorXd& fresh) {
+    for (const Eigen::Index i : used_)
+      for (const double sign : {reach, -reach}) stepper_.add(place, mean + sign * root.col(i).head(size()), fresh);
+    for (const std::size_t s : straight_)
+      for (const double sign : {reach, -reach}) stepper_.add(place, mean, fresh + sign * unit(s));
+  };
+  add_pairs(still);
+  for (std::size_t p = 0; p < lattice_points(); ++p) stepper_.add(place, mean, lattice_scores(p));
+  for (const std::size_t score : plan_.lattice)
+    for (const double sign : {reach, -reach}) add_pairs(sign * unit(score));
+}
+
+// Where one of a pair failed, the slope is that of the other side.
+Eigen::MatrixXd BeliefStep::first_differences(std::size_t at, const Eigen::VectorXd* centre,
+                                              Eigen::MatrixXd* bend) const {
+  Eigen::MatrixXd slope = Eigen::MatrixXd::Zero(states(), static_cast<Eigen::Index>(pairs()));
+  if (bend) *bend = slope;
+  for (std::size_t i = 0; i < pairs(); ++i) {
+    const bool lost_up = stepper_.failed(at + 2 * i), lost_down = stepper_.failed(at + 2 * i + 1);
+    const Eigen::VectorXd up = stepper_.next(at + 2 * i), down = stepper_.next(at + 2 * i + 1);
+    const auto column = static_cast<Eigen::Index>(i);
+    if (!lost_up && !lost_down) {
+      slope.col(column) = (up - down) / (2 * reach);
+      if (bend && centre) bend->col(column) = up + down - 2 * *centre;
+    } else if (centre && lost_up != lost_down) {
+      slope.col(column) = (lost_up ? *centre - down : up - *centre) / reach;
+    }
+  }
+  return slope;
+}
+
+BeliefStep::Slopes BeliefStep::slopes(std::size_t trial) const {
+  const std::size_t first = trial * points_;
+  Slopes s;
+  s.centre = stepper_.next(first);
+  s.first = first_differences(first + 1, stepper_.failed(first) ? nullptr : &s.centre, &s.bend);
+  std::size_t at = lattice_start(trial) + lattice_points();
+  for (std::size_t b = 0; b < plan_.lattice.size(); ++b, at += 4 * pairs())
+    s.by_score.push_back(
+        (first_differences(at, nullptr, nullptr) - first_differences(at + 2 * pairs(), nullptr, nullptr)) /
+        (2 * reach));
+  return s;
+}
+
+// Columns whose outer product is the covariance after the step: of the belief's root, of the straight scores, and of
+// this row's own errors.
+Eigen::MatrixXd BeliefStep::columns(const Eigen::MatrixXd& slope, const Eigen::MatrixXd& root) const {
+  const auto shared = static_cast<Eigen::Index>(shared_), offsets = static_cast<Eigen::Index>(stepper_.offsets());
+  const Eigen::Index before = states() + offsets, old = root.cols(),
+                     scores = static_cast<Eigen::Index>(straight_.size());
+  Eigen::MatrixXd all = Eigen::MatrixXd::Zero(size() + 2 * shared, old + scores + shared);
+  for (std::size_t i = 0; i < used_.size(); ++i)
+    all.col(used_[i]).head(states()) = slope.col(static_cast<Eigen::Index>(i));
+  all.block(states(), 0, offsets, old) = root.block(states(), 0, offsets, old);
+  for (Eigen::Index m = before; m < size(); ++m)
+    all.row(m).head(old) = stepper_.memory(static_cast<std::size_t>(m - before)) * root.row(m);
+  all.block(size() + shared, 0, shared, old) = root.bottomRows(shared);
+  for (Eigen::Index s = 0; s < scores; ++s) {
+    all.col(old + s).head(states()) = slope.col(static_cast<Eigen::Index>(used_.size()) + s);
+    const std::size_t score = straight_[static_cast<std::size_t>(s)];
+    if (stepper_.remembers())
+      all(before + static_cast<Eigen::Index>(score), old + s) = std::sqrt(1 - std::pow(stepper_.memory(score), 2));
+  }
+  for (Eigen::Index c = 0; c < shared; ++c) all(size() + c, old + scores + c) = 1;
+  return all;
+}
+
+// The step of a normal belief with the scores of the lattice at zero.
+BeliefMixture::Part BeliefStep::part(const Slopes& slopes, const BeliefMixture::Part& belief,
+                                     const Eigen::MatrixXd& root) const {
+  const auto shared = static_cast<Eigen::Index>(shared_), offsets = static_cast<Eigen::Index>(stepper_.offsets());
+  const Eigen::MatrixXd all = columns(slopes.first, root);
+  BeliefMixture::Part out;
+  out.mean = Eigen::VectorXd::Zero(all.rows());
+  out.mean.head(states()) = slopes.centre + slopes.bend.rowwise().sum() / (2 * reach * reach);
+  out.mean.segment(states(), offsets) = belief.mean.segment(states(), offsets);
+  for (Eigen::Index m = states() + offsets; m < size(); ++m)
+    out.mean[m] = stepper_.memory(static_cast<std::size_t>(m - states() - offsets)) * belief.mean[m];
+  out.mean.tail(shared) = belief.mean.tail(shared);
+  out.covariance = all * all.transpose();
+  out.covariance.topLeftCorner(states(), states()) += bend_share * slopes.bend * slopes.bend.transpose();
+  return out;
+}
+
+std::vector<BeliefStep::Interval> BeliefStep::Line::alive() const {
+  std::vector<Interval> all;
+  bool on = begins_alive;
+  double from = -infinite;
+  for (const double edge : edges) {
+    if (on) all.emplace_back(from, edge);
+    from = edge;
+    on = !on;
+  }
+  if (on) all.emplace_back(from, infinite);
+  return all;
+}
+
+// Lines along the failing score, with the edges of failure found by halving, those of all trials together. The points
+// that were stepped are needed later on: the halving steps in a stepper of its own.
+std::vector<BeliefStep::Line> BeliefStep::lines(std::span<const TransitionPlace> places,
+                                                std::span<const BeliefMixture::Part> beliefs) {
+  struct Edge {
+    std::size_t line;
+    double low, high;
+    bool low_alive;
+  };
+  std::vector<Line> all;
+  std::vector<Edge> edges;
+  const std::size_t n = axis_.points.size();
+  for (std::size_t t = 0; t < places.size(); ++t)
+    for (std::size_t p = 0; p < lattice_points(); p += n) {
+      const std::size_t first = lattice_start(t) + p;
+      all.push_back({t, p, !stepper_.failed(first)});
+      for (std::size_t i = 0; i + 1 < n; ++i)
+        if (stepper_.failed(first + i) != stepper_.failed(first + i + 1))
+          edges.push_back({all.size() - 1, axis_.points[i], axis_.points[i + 1], !stepper_.failed(first + i)});
+    }
+  if (edges.empty()) return all;
+  MachineStepper halving = stepper_;
+  for (int round = 0; round < halvings; ++round) {
+    halving.clear();
+    for (const Edge& edge : edges) {
+      Eigen::VectorXd fresh = lattice_scores(all[edge.line].first);
+      fresh[static_cast<Eigen::Index>(*plan_.failing)] = 0.5 * (edge.low + edge.high);
+      const std::size_t t = all[edge.line].trial;
+      halving.add(places[t], beliefs[t].mean.head(size()), fresh);
+    }
+    halving.run();
+    for (std::size_t e = 0; e < edges.size(); ++e)
+      (halving.failed(e) != edges[e].low_alive ? edges[e].low : edges[e].high) = 0.5 * (edges[e].low + edges[e].high);
+  }
+  for (const Edge& edge : edges) all[edge.line].edges.push_back(0.5 * (edge.low + edge.high));
+  return all;
+}
+
+// A cell is cut where its line fails; where its own point failed it takes the next state of the nearest that did not.
+BeliefStep::Cell BeliefStep::cell(std::size_t trial, std::size_t point, std::span<const Line> lines) const {
+  const std::size_t n = axis_.points.size(), start = lattice_start(trial), at = point % n;
+  Cell cell{.weight = 1, .anchor = point, .by_score = {}};
+  for (std::size_t b = 0, rest = point; b < plan_.lattice.size(); ++b, rest /= n) {
+    cell.weight *= axis_.weights[rest % n];
+    cell.by_score.push_back({1, axis_.points[rest % n], axis_.spread * axis_.spread});
+  }
+  if (lines.empty() || cell.weight < least_weight) return cell;
+  cell.by_score[0] = cell_part(axis_.points[at], axis_.spread, lines[point / n].alive());
+  for (std::size_t away = 1; stepper_.failed(start + cell.anchor) && away < n; ++away) {
+    if (at >= away && !stepper_.failed(start + point - away)) cell.anchor = point - away;
+    if (at + away < n && !stepper_.failed(start + point + away)) cell.anchor = point + away;
+  }
+  const double goes_on = stepper_.failed(start + cell.anchor) ? 0 : cell.by_score[0].mass;
+  cell.dead = cell.weight * (1 - goes_on);
+  cell.weight *= goes_on;
+  return cell;
+}
+
+// Moves a part from scores of zero to a cell, by first and second differences over the lattice.
+void BeliefStep::take_cell(BeliefMixture::Part& part, std::size_t trial, const Cell& cell) const {
+  const std::size_t n = axis_.points.size(), here = lattice_start(trial) + cell.anchor;
+  const Eigen::Index before = states() + static_cast<Eigen::Index>(stepper_.offsets());
+  const Eigen::VectorXd centre = stepper_.next(here);
+  std::size_t stride = 1, rest = cell.anchor;
+  for (std::size_t b = 0; b < plan_.lattice.size(); ++b, stride *= n, rest /= n) {
+    const std::size_t at = rest % n;
+    const bool up = at + 1 < n && !stepper_.failed(here + stride), down = at > 0 && !stepper_.failed(here - stride);
+    const Eigen::VectorXd above = up ? Eigen::VectorXd(stepper_.next(here + stride)) : centre;
+    const Eigen::VectorXd below = down ? Eigen::VectorXd(stepper_.next(here - stride)) : centre;
+    Eigen::VectorXd first = Eigen::VectorXd::Zero(states()), second = first;
+    if (up || down) first = (above - below) / ((up ? axis_.spacing : 0) + (down ? axis_.spacing : 0));
+    if (up && down) second = (above + below - 2 * centre) / (axis_.spacing * axis_.spacing);
+    const auto& [mass, mean, variance] = cell.by_score[b];
+    const double off = mean - axis_.points[at], sd = std::sqrt(variance);
+    part.mean.head(states()) += first * off + 0.5 * second * (off * off + variance);
+    Eigen::VectorXd column = Eigen::VectorXd::Zero(part.mean.size());
+    column.head(states()) = (first + second * off) * sd;
+    if (stepper_.remembers()) {
+      const double fresh = std::sqrt(1 - std::pow(stepper_.memory(plan_.lattice[b]), 2));
+      part.mean[before + static_cast<Eigen::Index>(plan_.lattice[b])] += fresh * mean;
+      column[before + static_cast<Eigen::Index>(plan_.lattice[b])] = fresh * sd;
+    }
+    part.covariance += column * column.transpose();
+    part.covariance.topLeftCorner(states(), states()) += 0.5 * variance * variance * second * second.transpose();
+  }
+}
+
+AfterStep BeliefStep::on_lattice(std::size_t trial, const BeliefMixture::Part& belief, const Eigen::MatrixXd& root,
+                                 std::span<const Line> lines) const {
+  const Slopes slope = slopes(trial);
+  const BeliefMixture::Part common = part(slope, belief, root);
+  const Eigen::VectorXd bent = common.mean.head(states()) - slope.centre;
+  AfterStep after;
+  for (std::size_t p = 0; p < lattice_points(); ++p) {
+    const Cell here = cell(trial, p, lines);
+    after.failed += here.dead;
+    if (here.weight < least_weight) continue;
+    BeliefMixture::Part one = common;
+    one.log_weight = std::log(here.weight);
+    one.mean.head(states()) = Eigen::VectorXd(stepper_.next(lattice_start(trial) + here.anchor)) + bent;
+    if (pairs() > 0) {
+      Slopes moved = slope;
+      for (std::size_t b = 0; b < plan_.lattice.size(); ++b) moved.first += here.by_score[b].mean * slope.by_score[b];
+      one.covariance = part(moved, belief, root).covariance;
+    }
+    take_cell(one, trial, here);
+    after.belief.parts().push_back(std::move(one));
+  }
+  return after;
+}
+
+std::vector<AfterStep> BeliefStep::step(std::span<const TransitionPlace> places,
+                                        std::span<const BeliefMixture::Part> beliefs) {
+  std::vector<Eigen::MatrixXd> roots;
+  for (const BeliefMixture::Part& belief : beliefs) roots.push_back(root_of(belief.covariance));
+  used_.clear();
+  for (Eigen::Index i = 0; !roots.empty() && i < roots.front().cols(); ++i)
+    if (std::ranges::any_of(roots, [&](const Eigen::MatrixXd& root) { return root.col(i).head(size()).any(); }))
+      used_.push_back(i);
+  points_ = 1 + 2 * pairs() + lattice_points() + 4 * pairs() * plan_.lattice.size();
+  stepper_.clear();
+  for (std::size_t t = 0; t < places.size(); ++t) add_points(places[t], beliefs[t], roots[t]);
+  stepper_.run();
+  std::vector<Line> edges;
+  if (plan_.failing) edges = lines(places, beliefs);
+  const std::size_t by_trial = edges.size() / std::max<std::size_t>(1, places.size());
+  std::vector<AfterStep> all;
+  for (std::size_t t = 0; t < places.size(); ++t) {
+    if (!plan_.lattice.empty()) {
+      all.push_back(on_lattice(t, beliefs[t], roots[t], std::span(edges).subspan(t * by_trial, by_trial)));
+      continue;
+    }
+    all.emplace_back();
+    all.back().belief.parts().push_back(part(slopes(t), beliefs[t], roots[t]));
+  }
+  return all;
+}
+
+}  // namespace metastable::analysis

@@ -1,0 +1,68 @@
+#pragma once
+// Carries what is believed of a machine's state over one step, for many trials at once.
+
+#include <Eigen/Core>
+#include <span>
+#include <vector>
+
+#include "analysis/machine_model/belief_mixture.h"
+#include "analysis/machine_model/machine_filter.h"
+#include "analysis/machine_model/machine_stepper.h"
+#include "analysis/machine_model/score_lattice.h"
+
+namespace metastable::analysis {
+
+/// What is believed after a step, before anything is seen. The vector holds the machine's point (see
+/// MachineStepper::size()), then an error of this row for every sensor that shares errors between rows, then the one of
+/// the row before.
+struct AfterStep {
+  BeliefMixture belief;
+  double failed = 0;  ///< probability that the machine failed; the weights add up to the rest
+};
+
+/// Steps beliefs. A belief before a step holds the point and the errors of its row.
+class BeliefStep {
+ public:
+  /// @param shared  sensors that share errors between rows
+  BeliefStep(MachineStepper& stepper, const ScorePlan& plan, std::size_t shared);
+  std::vector<AfterStep> step(std::span<const TransitionPlace> places, std::span<const BeliefMixture::Part> beliefs);
+
+ private:
+  struct Slopes;
+  struct Cell;
+  using Interval = std::pair<double, double>;
+  /// One line of the lattice along the failing score, in one trial: where on it the machine goes on.
+  struct Line {
+    std::size_t trial = 0, first = 0;  // of its points, of the trial's lattice
+    bool begins_alive = true;
+    std::vector<double> edges = {};  // where going on and failing meet, ascending
+    std::vector<Interval> alive() const;
+  };
+
+  Eigen::Index states() const { return static_cast<Eigen::Index>(stepper_.states()); }
+  Eigen::Index size() const { return static_cast<Eigen::Index>(stepper_.size()); }
+  std::size_t pairs() const { return used_.size() + straight_.size(); }
+  std::size_t lattice_start(std::size_t trial) const { return trial * points_ + 1 + 2 * pairs(); }
+  std::size_t lattice_points() const;
+  Eigen::VectorXd lattice_scores(std::size_t point) const;
+  void add_points(const TransitionPlace& place, const BeliefMixture::Part& belief, const Eigen::MatrixXd& root);
+  std::vector<Line> lines(std::span<const TransitionPlace> places, std::span<const BeliefMixture::Part> beliefs);
+  Eigen::MatrixXd first_differences(std::size_t at, const Eigen::VectorXd* centre, Eigen::MatrixXd* bend) const;
+  Slopes slopes(std::size_t trial) const;
+  Eigen::MatrixXd columns(const Eigen::MatrixXd& slope, const Eigen::MatrixXd& root) const;
+  BeliefMixture::Part part(const Slopes& slopes, const BeliefMixture::Part& belief, const Eigen::MatrixXd& root) const;
+  Cell cell(std::size_t trial, std::size_t point, std::span<const Line> lines) const;
+  void take_cell(BeliefMixture::Part& part, std::size_t trial, const Cell& cell) const;
+  AfterStep on_lattice(std::size_t trial, const BeliefMixture::Part& belief, const Eigen::MatrixXd& root,
+                       std::span<const Line> lines) const;
+
+  MachineStepper& stepper_;
+  ScorePlan plan_;
+  std::size_t shared_;
+  LatticeAxis axis_;
+  std::vector<std::size_t> straight_;  // scores that are not on the lattice
+  std::vector<Eigen::Index> used_;     // columns of the roots that move points
+  std::size_t points_ = 0;             // of a trial
+};
+
+}  // namespace metastable::analysis

@@ -1,0 +1,110 @@
+#include "analysis/machine_model/machine.h"
+
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+
+#include <algorithm>
+#include <cmath>
+#include <set>
+#include <stdexcept>
+
+namespace metastable::analysis {
+namespace {
+
+constexpr std::size_t most_states = 30;
+constexpr int most_scores = 16;
+
+void require_finite(const std::string& what, double value) {
+  if (!std::isfinite(value)) throw std::invalid_argument(fmt::format("{}: {} is not a finite number", what, value));
+}
+
+void require_parameter(const MachineParameter& p) {
+  require_finite("parameters: " + p.name, p.nominal);
+  if (!(p.sd >= 0) || !std::isfinite(p.sd))
+    throw std::invalid_argument(fmt::format("parameters: {}: the sd {} is not in [0, inf)", p.name, p.sd));
+  if (!(p.lower < p.upper) || !(p.lower <= p.nominal && p.nominal <= p.upper))
+    throw std::invalid_argument(fmt::format("parameters: {}: the nominal value {} is outside its bounds [{}, {}]",
+                                            p.name, p.nominal, p.lower, p.upper));
+}
+
+void require_effect(const MachineEffect& effect) {
+  if (effect.parameters.empty()) throw std::invalid_argument(fmt::format("effects: {}: has no parameter", effect.id));
+  for (const SuspectedParameter& p : effect.parameters) {
+    require_finite(fmt::format("effects: {}: {}", effect.id, p.name), p.neutral);
+    if (!std::isfinite(p.lower) || !std::isfinite(p.upper) || !(p.lower < p.upper) ||
+        !(p.lower <= p.neutral && p.neutral <= p.upper))
+      throw std::invalid_argument(fmt::format("effects: {}: {}: the neutral value {} is outside its bounds [{}, {}]",
+                                              effect.id, p.name, p.neutral, p.lower, p.upper));
+  }
+}
+
+// What one word names must be one thing.
+void require_distinct(const std::string& what, const std::vector<std::string>& names) {
+  std::set<std::string> seen;
+  for (const std::string& name : names) {
+    if (name.empty()) throw std::invalid_argument(fmt::format("{}: a name is empty", what));
+    if (!seen.insert(name).second) throw std::invalid_argument(fmt::format("{}: \"{}\" is there twice", what, name));
+  }
+}
+
+}  // namespace
+
+std::vector<std::string> Machine::value_names() const {
+  std::vector<std::string> names;
+  for (const MachineParameter& p : parameters) names.push_back(p.name);
+  for (const MachineEffect& effect : effects)
+    for (const SuspectedParameter& p : effect.parameters) names.push_back(p.name);
+  names.insert(names.end(), inputs.begin(), inputs.end());
+  return names;
+}
+
+std::size_t Machine::state_index(const std::string& state) const {
+  const auto at = std::ranges::find(states, state);
+  if (at == states.end())
+    throw std::invalid_argument(fmt::format("\"{}\" is none of the states {}", state, fmt::join(states, ", ")));
+  return static_cast<std::size_t>(at - states.begin());
+}
+
+void Machine::require_valid() const {
+  if (!step) throw std::invalid_argument("step: there is none");
+  if (states.empty() || states.size() > most_states)
+    throw std::invalid_argument(fmt::format("states: {} are outside 1 to {}", states.size(), most_states));
+  if (scores < 1 || scores > most_scores)
+    throw std::invalid_argument(fmt::format("noise: {} is outside 1 to {}", scores, most_scores));
+  require_distinct("states", states);
+  require_distinct("parameters, effects and inputs", value_names());
+  for (const MachineParameter& p : parameters) require_parameter(p);
+  std::vector<std::string> ids, observed;
+  for (const MachineEffect& effect : effects) {
+    require_effect(effect);
+    ids.push_back(effect.id);
+  }
+  require_distinct("effects", ids);
+  for (const std::string& name : may_vary)
+    if (std::ranges::find(parameters, name, &MachineParameter::name) == parameters.end())
+      throw std::invalid_argument(fmt::format("may_vary: \"{}\" is none of the parameters", name));
+  require_distinct("may_vary", may_vary);
+  if (observe.empty()) throw std::invalid_argument("sensor: no state is measured");
+  for (const MachineSensor& sensor : observe) {
+    state_index(sensor.state);
+    observed.push_back(sensor.state);
+    if (sensor.sd && !(*sensor.sd >= 0 && std::isfinite(*sensor.sd)))
+      throw std::invalid_argument(fmt::format("sensor: {}: the sd {} is not in [0, inf)", sensor.state, *sensor.sd));
+    if (!(std::abs(sensor.correlation) <= 0.5))
+      throw std::invalid_argument(
+          fmt::format("sensor: {}: the correlation {} between neighbouring rows is outside "
+                      "[-0.5, 0.5]",
+                      sensor.state, sensor.correlation));
+  }
+  require_distinct("sensor", observed);
+  for (const MachineLaunch& launch : launches) {
+    state_index(launch.state);
+    require_finite("launch: " + launch.state, launch.mean);
+    if (!(launch.sd >= 0) || !std::isfinite(launch.sd))
+      throw std::invalid_argument(fmt::format("launch: {}: the sd {} is not in [0, inf)", launch.state, launch.sd));
+  }
+  if (!(most_wild >= 0 && most_wild <= 0.2))
+    throw std::invalid_argument(fmt::format("most_wild: {} is outside [0, 0.2]", most_wild));
+}
+
+}  // namespace metastable::analysis

@@ -1,0 +1,79 @@
+#pragma once
+// A machine that its user brings: a step map with names, what is known of its parameters, what is suspected of it, and
+// what was measured of it.
+
+#include <cstdint>
+#include <functional>
+#include <limits>
+#include <optional>
+#include <span>
+#include <string>
+#include <vector>
+
+namespace metastable::analysis {
+
+/// A number of the nominal model. A recalibration refits it where its sd is above 0.
+struct MachineParameter {
+  std::string name;
+  double nominal = 0, sd = 0;  ///< value, and the sd with which it is known
+  double lower = -std::numeric_limits<double>::infinity(), upper = std::numeric_limits<double>::infinity();
+};
+
+/// A number of an effect: the nominal model has it at its neutral value.
+struct SuspectedParameter {
+  std::string name;
+  double neutral = 0, lower = 0, upper = 0;
+};
+
+/// An effect that the user suspects.
+struct MachineEffect {
+  std::string id;
+  std::vector<SuspectedParameter> parameters;  ///< at least one
+};
+
+/// A state that is measured.
+struct MachineSensor {
+  std::string state;
+  std::optional<double> sd;  ///< of its error; nothing: fitted
+  double correlation = 0;    ///< of the errors of neighbouring rows, in [-0.5, 0.5]
+};
+
+/// The distribution from which the first value of a state comes, where a trial's first row does not have it.
+struct MachineLaunch {
+  std::string state;
+  double mean = 0, sd = 0;
+};
+
+/// One call of a step map: `rows` states at once. A value (see Machine::value_names()) is one number for all rows, or
+/// one a row.
+struct MachineBatch {
+  std::size_t rows = 0;
+  std::span<const double> states;                   ///< [rows x states]
+  std::span<const double> scores;                   ///< [rows x scores] standard normal
+  std::span<const std::span<const double>> values;  ///< [values] of length 1 or `rows`
+  std::span<double> next;                           ///< [rows x states] to be filled in
+  std::span<std::uint8_t> failed;                   ///< [rows] 1 where the machine failed; next does not count then
+};
+
+struct Machine {
+  std::string name = "machine";
+  std::vector<std::string> states;  ///< 1 to 30
+  int scores = 1;                   ///< standard normal numbers that a step takes, >= 1
+  std::function<void(const MachineBatch&)> step;
+  std::vector<MachineParameter> parameters;
+  std::vector<MachineEffect> effects;
+  std::vector<std::string> may_vary;    ///< parameters that may differ by phase, run, clock, place, state or label
+  std::vector<MachineSensor> observe;   ///< at least one
+  std::vector<MachineLaunch> launches;  ///< of states that a first row may lack
+  std::vector<std::string> inputs;      ///< recorded numbers that a step is given, by their columns' names
+  double most_wild = 0.01;  ///< largest share of rows that may be wild (missed events, bad tracks), [0, 0.2]
+
+  /// Names what MachineBatch::values holds, in order: parameters, the effects' parameters, inputs.
+  std::vector<std::string> value_names() const;
+  /// Returns the index of a state. @throws std::invalid_argument for an unknown one, with those there are
+  std::size_t state_index(const std::string& state) const;
+  /// @throws std::invalid_argument naming the first thing that is wrong, and the range
+  void require_valid() const;
+};
+
+}  // namespace metastable::analysis

@@ -1,0 +1,85 @@
+#include "analysis/machine_model/machine_design.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "analysis/statistics/median.h"
+
+namespace metastable::analysis {
+namespace {
+
+// Fills in means and spreads of the columns.
+void measure_columns(MachineDesign& design, const Machine& machine, const MachineRuns& runs) {
+  for (std::size_t j = 0; j < machine.observe.size(); ++j) {
+    double count = 0, sum = 0, squares = 0, pairs = 0, first = 0, second = 0;
+    for (const MachineTrial& trial : runs.trials)
+      for (std::size_t k = 0; k < trial.rows.size(); ++k) {
+        const double x = trial.rows[k].seen[j];
+        if (std::isnan(x)) continue;
+        ++count;
+        sum += x;
+        squares += x * x;
+        if (k == 0 || std::isnan(trial.rows[k - 1].seen[j])) continue;
+        const double moved = x - trial.rows[k - 1].seen[j];
+        ++pairs;
+        first += moved;
+        second += moved * moved;
+      }
+    const double mean = sum / std::max(1.0, count);
+    design.mean.push_back(mean);
+    design.sd.push_back(std::sqrt(std::max(0.0, squares / std::max(1.0, count) - mean * mean)));
+    const double drift = first / std::max(1.0, pairs);
+    design.change.push_back(std::sqrt(std::max(0.0, second / std::max(1.0, pairs) - drift * drift)));
+  }
+}
+
+void measure_place(MachineDesign& design, const MachineRuns& runs) {
+  design.timed = runs.timed();
+  design.placed = runs.placed();
+  std::vector<double> gaps;
+  bool first = true;
+  for (const MachineTrial& trial : runs.trials)
+    for (std::size_t k = 0; k < trial.rows.size(); ++k) {
+      const MachineRow& row = trial.rows[k];
+      design.first_time = first ? row.time : std::min(design.first_time, row.time);
+      design.last_time = first ? row.time : std::max(design.last_time, row.time);
+      design.first_position = first ? row.position : std::min(design.first_position, row.position);
+      design.last_position = first ? row.position : std::max(design.last_position, row.position);
+      first = false;
+      if (design.timed && k > 0) gaps.push_back(row.time - trial.rows[k - 1].time);
+    }
+  if (!gaps.empty()) design.usual_gap = median(std::move(gaps));
+  design.timed = design.timed && design.usual_gap > 0 && design.last_time > design.first_time;
+  design.placed = design.placed && design.last_position > design.first_position;
+}
+
+}  // namespace
+
+MachineDesign machine_design(const Machine& machine, const MachineRuns& runs) {
+  MachineDesign design;
+  design.trials = runs.trials.size();
+  design.phases = runs.phases.size();
+  design.labels = runs.labels;
+  measure_columns(design, machine, runs);
+  measure_place(design, runs);
+  const double last = runs.trials.size() > 1 ? static_cast<double>(runs.trials.size() - 1) : 1;
+  for (std::size_t t = 0; t < runs.trials.size(); ++t)
+    for (std::size_t k = 0; k < steps_of(runs.trials[t]); ++k) {
+      const MachineRow& row = runs.trials[t].rows[k];
+      StepPlace place{t,
+                      static_cast<int>(k) + 1,
+                      static_cast<double>(t) / last - 0.5,
+                      row.time,
+                      row.position,
+                      row.phase,
+                      row.labels,
+                      {}};
+      for (std::size_t j = 0; j < row.seen.size(); ++j)
+        place.seen.push_back(
+            std::isnan(row.seen[j]) || !(design.sd[j] > 0) ? 0 : (row.seen[j] - design.mean[j]) / design.sd[j]);
+      design.steps.push_back(std::move(place));
+    }
+  return design;
+}
+
+}  // namespace metastable::analysis

@@ -1,0 +1,48 @@
+#pragma once
+// Where and when a machine's steps were taken: what an effect of any machine may go by.
+
+#include <cstddef>
+#include <string>
+#include <vector>
+
+#include "analysis/machine_model/machine.h"
+#include "analysis/machine_model/machine_runs.h"
+
+namespace metastable::analysis {
+
+/// The place of one step. NaN or -1: not known.
+struct StepPlace {
+  std::size_t trial = 0;
+  int number = 1;            ///< in its trial, from 1
+  double run = 0;            ///< place of its trial in the order of runs, -1/2 to 1/2
+  double time = 0;           ///< [s]
+  double position = 0;       ///< [m]
+  int phase = -1;            ///< index
+  std::vector<int> labels;   ///< index of each label's value
+  std::vector<double> seen;  ///< [sensors] before the step, in sds of its column from the mean; 0 where it is missing
+};
+
+/// All steps of the runs, in the order in which MachineHypothesis numbers them, and what they cover.
+struct MachineDesign {
+  std::vector<StepPlace> steps;
+  std::size_t trials = 0, phases = 0;
+  std::vector<MachineLabel> labels;
+  bool timed = false, placed = false;
+  double first_time = 0, last_time = 0, usual_gap = 0;  ///< [s]; the median time of a step
+  double first_position = 0, last_position = 0;         ///< [m]
+  std::vector<double> mean, sd;                         ///< by sensor, of its column
+  std::vector<double> change;                           ///< by sensor: sd of its change from row to row
+};
+
+MachineDesign machine_design(const Machine& machine, const MachineRuns& runs);
+
+/// Returns a number for every step.
+template <class Of>
+std::vector<double> by_step(const MachineDesign& design, Of of) {
+  std::vector<double> all;
+  all.reserve(design.steps.size());
+  for (const StepPlace& place : design.steps) all.push_back(of(place));
+  return all;
+}
+
+}  // namespace metastable::analysis

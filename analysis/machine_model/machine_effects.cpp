@@ -1,0 +1,288 @@
+#include "analysis/machine_model/machine_effects.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+#include <string>
+#include <utility>
+
+namespace metastable::analysis {
+namespace {
+
+using Values = std::vector<double>;
+
+constexpr double fine_step = 1e-4;        // of a range, for differences
+constexpr double widest_change = 0.5;     // of a nominal value, or
+constexpr double most_sds = 5;            //   of the sd with which it is known: how far a parameter may vary
+constexpr std::size_t fewest_trials = 5;  // whose spread is told
+constexpr int most_waves = 24;            // of a clock, at equal ratios
+constexpr int stretches = 6;              // of the way
+constexpr double largest_memory = 0.9;
+constexpr double largest_share = 0.2;  // of outliers
+
+// Returns how far a parameter may vary to either side.
+double range_of(const MachineParameter& p) {
+  const double range = std::max(widest_change * std::abs(p.nominal), most_sds * p.sd);
+  return range > 0 ? range : 1;
+}
+
+std::function<std::vector<NamedValue>(const Values&, const Values&)> reporting(std::vector<std::string> variant,
+                                                                               std::vector<std::string> values) {
+  return [variant = std::move(variant), values = std::move(values)](const Values& at, const Values& v) {
+    std::vector<NamedValue> all;
+    for (std::size_t i = 0; i < values.size(); ++i) all.emplace_back(values[i], v[i]);
+    for (std::size_t i = 0; i < variant.size(); ++i) all.emplace_back(variant[i], at[i]);
+    return all;
+  };
+}
+
+MachineCandidate suspected(const MachineEffect& effect, std::size_t first) {
+  MachineCandidate one;
+  one.candidate.id = effect.id;
+  std::vector<std::string> names;
+  for (const SuspectedParameter& p : effect.parameters) {
+    one.candidate.parameters.push_back({p.neutral, p.lower, p.upper, fine_step * (p.upper - p.lower)});
+    names.push_back(p.name);
+  }
+  one.candidate.report = reporting({}, std::move(names));
+  one.apply = [first](MachineHypothesis& h, const Values&, const Values& v) {
+    for (std::size_t i = 0; i < v.size(); ++i) h.values[first + i] = v[i];
+  };
+  return one;
+}
+
+// What one parameter of the machine may do by itself.
+class Varying {
+ public:
+  Varying(const MachineParameter& parameter, std::size_t value, std::shared_ptr<const MachineDesign> design)
+      : parameter_(parameter),
+        value_(value),
+        shared_(std::move(design)),
+        design_(*shared_),
+        range_(range_of(parameter)) {}
+
+  std::vector<MachineCandidate> all(const Machine& machine) const {
+    std::vector<MachineCandidate> list{by_phase(), drift(), spread(), clock(), stretch()};
+    for (std::size_t j = 0; j < machine.observe.size(); ++j) list.push_back(with_state(machine, j));
+    for (std::size_t l = 0; l < design_.labels.size(); ++l) list.push_back(by_label(l));
+    return list;
+  }
+
+ private:
+  using Weight = std::function<double(const StepPlace&, const Values& variant, std::size_t parameter)>;
+
+  FreeParameter change() const { return {0, -range_, range_, fine_step * range_}; }
+  MachineCandidate named(const std::string& suffix) const {
+    MachineCandidate one;
+    one.candidate.id = parameter_.name + suffix;
+    return one;
+  }
+  // Adds a sum of weights times values to the parameter, step by step.
+  std::function<void(MachineHypothesis&, const Values&, const Values&)> adding(Weight weight) const {
+    return [value = value_, design = shared_, weight = std::move(weight)](MachineHypothesis& h, const Values& variant,
+                                                                          const Values& v) {
+      h.changes.push_back({value, by_step(*design, [&](const StepPlace& place) {
+                             double sum = 0;
+                             for (std::size_t i = 0; i < v.size(); ++i)
+                               if (v[i] != 0) sum += v[i] * weight(place, variant, i);
+                             return sum;
+                           })});
+    };
+  }
+
+  MachineCandidate by_phase() const {
+    MachineCandidate one = named("_by_phase");
+    one.candidate.parameters = {change()};
+    one.candidate.variants.clear();
+    for (std::size_t phase = 0; phase < std::max<std::size_t>(1, design_.phases); ++phase)
+      one.candidate.variants.push_back({static_cast<double>(phase)});
+    if (design_.phases == 2)
+      one.candidate.variants.resize(1);  // the other differs by the same, and the nominal is fitted
+    if (design_.phases < 2) one.candidate.undecidable = "the runs have no column of phases with two of them";
+    one.candidate.report = reporting({"phase"}, {"change"});
+    one.apply = adding([](const StepPlace& at, const Values& variant, std::size_t) {
+      return at.phase == static_cast<int>(variant[0]) ? 1.0 : 0.0;
+    });
+    return one;
+  }
+  MachineCandidate drift() const {
+    MachineCandidate one = named("_drift");
+    one.candidate.parameters = {change()};
+    one.candidate.report = reporting({}, {"change_over_the_runs"});
+    if (design_.trials < 3) one.candidate.undecidable = "a drift over the runs takes three trials";
+    one.apply = adding([](const StepPlace& at, const Values&, std::size_t) { return at.run; });
+    return one;
+  }
+  MachineCandidate spread() const {
+    MachineCandidate one = named("_spread");
+    one.candidate.parameters = {{0, 0, range_ * range_, 1e-6 * range_ * range_, 1e-2 * range_ * range_}};
+    one.candidate.report = [](const Values&, const Values& v) {
+      return std::vector<NamedValue>{{"sd_between_trials", std::sqrt(std::max(0.0, v[0]))}};
+    };
+    one.candidate.form_of = [](const Values& v) { return FittedForm{{}, {v[0] * v[0]}}; };
+    if (design_.trials < fewest_trials)
+      one.candidate.undecidable = fmt::format("a spread between trials takes {} of them", fewest_trials);
+    one.apply = [value = value_](MachineHypothesis& h, const Values&, const Values& v) {
+      if (v[0] > 0) h.spreads.push_back({value, std::sqrt(v[0])});
+    };
+    return one;
+  }
+  MachineCandidate clock() const {
+    MachineCandidate one = named("_clock");
+    one.candidate.parameters = {change(), change()};
+    one.candidate.variants.clear();
+    const double whole = design_.last_time - design_.first_time, fastest = 2 * design_.usual_gap;
+    if (design_.timed && whole > 2 * fastest) {
+      const double ratio = std::pow(whole / fastest, 1.0 / (most_waves - 1));
+      for (int i = 0; i < most_waves; ++i) one.candidate.variants.push_back({1 / (fastest * std::pow(ratio, i))});
+      one.candidate.refine = {0};
+    } else {
+      one.candidate.variants = {{1.0}};
+      one.candidate.undecidable = "the runs have no clock: a time_s for every row, by one clock for all trials";
+    }
+    one.candidate.report = [](const Values& variant, const Values& v) {
+      return std::vector<NamedValue>{{"amplitude", std::hypot(v[0], v[1])}, {"frequency_hz", variant[0]}};
+    };
+    one.apply = adding([first = design_.first_time](const StepPlace& at, const Values& variant, std::size_t i) {
+      const double angle = 2 * std::numbers::pi * variant[0] * (at.time - first);
+      return i == 0 ? std::cos(angle) : std::sin(angle);
+    });
+    return one;
+  }
+  MachineCandidate stretch() const {
+    MachineCandidate one = named("_stretch");
+    one.candidate.parameters = {change()};
+    one.candidate.variants.clear();
+    const double way = (design_.last_position - design_.first_position) / stretches;
+    if (design_.placed) {
+      for (int from = 0; from < stretches; ++from)
+        for (int to = from + 1; to <= std::min(stretches, from + stretches / 2); ++to)
+          one.candidate.variants.push_back({design_.first_position + from * way, design_.first_position + to * way});
+      one.candidate.refine = {0.5 * way, 0.5 * way};
+    } else {
+      one.candidate.variants = {{0.0, 0.0}};
+      one.candidate.undecidable = "the runs have no position_m for every row";
+    }
+    one.candidate.report = reporting({"from_m", "to_m"}, {"change"});
+    one.apply = adding([](const StepPlace& at, const Values& variant, std::size_t) {
+      return at.position >= variant[0] && at.position < variant[1] ? 1.0 : 0.0;
+    });
+    return one;
+  }
+  MachineCandidate with_state(const Machine& machine, std::size_t sensor) const {
+    MachineCandidate one = named("_with_" + machine.observe[sensor].state);
+    one.candidate.parameters = {change()};
+    one.candidate.report = reporting({}, {"change_a_sd_of_the_state"});
+    const double sd = design_.sd[sensor] > 0 ? design_.sd[sensor] : 1;
+    one.apply = [value = value_, state = machine.state_index(machine.observe[sensor].state), sd,
+                 mean = design_.mean[sensor]](MachineHypothesis& h, const Values&, const Values& v) {
+      h.laws.push_back({value, state, v[0] / sd, mean});
+    };
+    return one;
+  }
+  MachineCandidate by_label(std::size_t label) const {
+    const MachineLabel& column = design_.labels[label];
+    MachineCandidate one = named("_by_" + column.name);
+    one.candidate.parameters = {change()};
+    one.candidate.variants.clear();
+    for (std::size_t v = 0; v < std::max<std::size_t>(1, column.values.size()); ++v)
+      one.candidate.variants.push_back({static_cast<double>(v)});
+    if (column.values.size() == 2) one.candidate.variants.resize(1);
+    if (column.values.size() < 2) one.candidate.undecidable = fmt::format("{} has one value", column.name);
+    one.candidate.report = reporting({column.name + "_index"}, {"change"});
+    one.apply = adding([label](const StepPlace& at, const Values& variant, std::size_t) {
+      return at.labels[label] == static_cast<int>(variant[0]) ? 1.0 : 0.0;
+    });
+    return one;
+  }
+
+  const MachineParameter& parameter_;
+  std::size_t value_;
+  std::shared_ptr<const MachineDesign> shared_;
+  const MachineDesign& design_;
+  double range_;
+};
+
+MachineCandidate memory(const Machine& machine) {
+  MachineCandidate one;
+  one.candidate.id = "memory";
+  one.candidate.parameters = {{0, -largest_memory, largest_memory, 1e-3}};
+  one.candidate.variants.clear();
+  for (int m = 0; m < machine.scores; ++m) one.candidate.variants.push_back({static_cast<double>(m)});
+  one.candidate.report = [](const Values& variant, const Values& v) {
+    return std::vector<NamedValue>{{"correlation", v[0]}, {"noise_number", variant[0] + 1}};
+  };
+  one.candidate.form_of = [](const Values& v) { return FittedForm{{v[1] - 1}, {v[0]}}; };
+  one.apply = [scores = static_cast<std::size_t>(machine.scores)](MachineHypothesis& h, const Values& variant,
+                                                                  const Values& v) {
+    h.memory.resize(scores);
+    h.memory[static_cast<std::size_t>(variant[0])] = v[0];
+  };
+  return one;
+}
+
+MachineCandidate outliers() {
+  MachineCandidate one;
+  one.candidate.id = "outliers";
+  one.candidate.parameters = {{0, 0, largest_share, 1e-4, 0.02}};
+  one.candidate.report = reporting({}, {"share"});
+  one.apply = [](MachineHypothesis& h, const Values&, const Values& v) { h.outliers = v[0]; };
+  return one;
+}
+
+MachineCandidate sensor_noise(const Machine& machine, const MachineDesign& design, std::size_t sensor) {
+  MachineCandidate one;
+  one.candidate.id = "sensor_noise_" + machine.observe[sensor].state;
+  one.candidate.exact = true;
+  const double most = design.sd[sensor] * design.sd[sensor], known = machine.observe[sensor].sd.value_or(0);
+  const double usual = known > 0 ? known * known : 1e-4 * design.change[sensor] * design.change[sensor];
+  one.candidate.parameters = {{0, 0, std::max(most, usual), 1e-2 * usual, usual}};
+  one.candidate.report = [](const Values&, const Values& v) {
+    return std::vector<NamedValue>{{"sd", std::sqrt(std::max(0.0, v[0]))}};
+  };
+  one.candidate.form_of = [](const Values& v) { return FittedForm{{}, {v[0] * v[0]}}; };
+  if (!machine.observe[sensor].sd) one.candidate.undecidable = "the sensor's sd is not stated: it is fitted";
+  one.apply = [sensor, sensors = machine.observe.size()](MachineHypothesis& h, const Values&, const Values& v) {
+    h.added_noise.resize(sensors);
+    h.added_noise[sensor] = std::sqrt(std::max(0.0, v[0]));
+  };
+  return one;
+}
+
+MachineCandidate sensor_bias(const Machine& machine, const MachineDesign& design, std::size_t sensor) {
+  MachineCandidate one;
+  one.candidate.id = "sensor_bias_" + machine.observe[sensor].state;
+  one.candidate.exact = true;
+  const double most = 2 * design.sd[sensor];
+  one.candidate.parameters = {{0, -most, most, fine_step * most}};
+  one.candidate.report = reporting({}, {"bias"});
+  one.apply = [sensor, sensors = machine.observe.size()](MachineHypothesis& h, const Values&, const Values& v) {
+    h.bias.resize(sensors);
+    h.bias[sensor] = v[0];
+  };
+  return one;
+}
+
+}  // namespace
+
+std::vector<MachineCandidate> machine_effects(const Machine& machine, std::shared_ptr<const MachineDesign> design) {
+  std::vector<MachineCandidate> all;
+  std::size_t value = machine.parameters.size();
+  for (const MachineEffect& effect : machine.effects) {
+    all.push_back(suspected(effect, value));
+    value += effect.parameters.size();
+  }
+  for (std::size_t p = 0; p < machine.parameters.size(); ++p) {
+    if (std::ranges::find(machine.may_vary, machine.parameters[p].name) == machine.may_vary.end()) continue;
+    for (MachineCandidate& one : Varying(machine.parameters[p], p, design).all(machine)) all.push_back(std::move(one));
+  }
+  all.push_back(memory(machine));
+  all.push_back(outliers());
+  for (std::size_t j = 0; j < machine.observe.size(); ++j) all.push_back(sensor_noise(machine, *design, j));
+  for (std::size_t j = 0; j < machine.observe.size(); ++j) all.push_back(sensor_bias(machine, *design, j));
+  return all;
+}
+
+}  // namespace metastable::analysis

@@ -1,0 +1,27 @@
+#pragma once
+// The effects of a machine as they are fitted: those that its user suspects, and those that any machine may have.
+
+#include <functional>
+#include <memory>
+#include <vector>
+
+#include "analysis/fitting/transition_model.h"
+#include "analysis/machine_model/machine.h"
+#include "analysis/machine_model/machine_design.h"
+#include "analysis/machine_model/machine_hypothesis.h"
+
+namespace metastable::analysis {
+
+/// An effect as it is fitted, and what it does to what is supposed of the machine.
+struct MachineCandidate {
+  Candidate candidate;
+  std::function<void(MachineHypothesis&, const std::vector<double>& variant, const std::vector<double>& values)> apply;
+};
+
+/// Lists the suspected effects by their ids; then, for each parameter q that may vary, q_by_phase, q_drift (over the
+/// order of runs), q_spread (from trial to trial), q_clock (a sine of time), q_stretch (of the way), q_with_STATE (for
+/// each measured state) and q_by_LABEL; then memory (of the scores), outliers (of the scores), and sensor_noise_STATE
+/// and sensor_bias_STATE for each measured state. Those that the runs cannot show say why.
+std::vector<MachineCandidate> machine_effects(const Machine& machine, std::shared_ptr<const MachineDesign> design);
+
+}  // namespace metastable::analysis

@@ -1,0 +1,246 @@
+#include "analysis/machine_model/machine_filter.h"
+
+#include <algorithm>
+#include <cmath>
+#include <utility>
+
+#include "analysis/machine_model/belief_step.h"
+#include "analysis/machine_model/shared_error.h"
+#include "dynamics/numerics/truncated_normal.h"
+
+namespace metastable::analysis {
+namespace {
+
+constexpr double least_share = 1e-9;  // of a column's spread, that is taken for its error where there is none
+constexpr double least_chance = 1e-300;
+constexpr SeenValue out_of_reach{-1e5, 37, 1};
+
+bool unseen(const MachineRow& row) {
+  return std::ranges::all_of(row.seen, [](double x) { return std::isnan(x); });
+}
+
+// Follows all trials of the runs under one hypothesis.
+class Follower {
+ public:
+  Follower(const Machine& machine, const MachineRuns& runs, const ScorePlan& plan, const MachineHypothesis& supposed)
+      : machine_(machine), runs_(runs), plan_(plan), supposed_(supposed), stepper_(machine, runs, supposed) {
+    for (std::size_t j = 0; j < machine.observe.size(); ++j) {
+      state_.push_back(static_cast<Eigen::Index>(machine.state_index(machine.observe[j].state)));
+      shared_.push_back(machine.observe[j].correlation != 0 ? shared_count_++ : -1);
+      scale_.push_back(spread_of(j));
+    }
+    std::size_t number = 0;
+    for (const MachineTrial& trial : runs.trials) {
+      first_.push_back(number);
+      number += steps_of(trial);
+    }
+  }
+
+  Evaluation follow(const std::vector<Event>& events, std::vector<double>* chances);
+
+ private:
+  double spread_of(std::size_t sensor) const;
+  double added_variance(std::size_t sensor) const;
+  BeliefMixture::Part launched(const MachineRow& row) const;
+  Look look(std::size_t sensor, Eigen::Index size) const;
+  BeliefMixture::Part see(AfterStep& after, const MachineRow& row);
+  void put(std::size_t event, const SeenValue& seen, double failed);
+
+  const Machine& machine_;
+  const MachineRuns& runs_;
+  const ScorePlan& plan_;
+  const MachineHypothesis& supposed_;
+  MachineStepper stepper_;
+  std::vector<Eigen::Index> state_;  // by sensor
+  std::vector<int> shared_;          // by sensor: which of those that share errors; -1: none
+  int shared_count_ = 0;
+  std::vector<double> scale_;       // by sensor: spread of its column
+  std::vector<std::size_t> first_;  // by trial: number of its first transition
+  Evaluation out_;
+  std::vector<double>* chances_ = nullptr;
+  std::vector<std::size_t> cursor_;  // by trial: its next event
+  std::size_t trial_ = 0;
+};
+
+double Follower::spread_of(std::size_t sensor) const {
+  double count = 0, sum = 0, squares = 0;
+  for (const MachineTrial& trial : runs_.trials)
+    for (const MachineRow& row : trial.rows)
+      if (!std::isnan(row.seen[sensor])) {
+        ++count;
+        sum += row.seen[sensor];
+        squares += row.seen[sensor] * row.seen[sensor];
+      }
+  const double mean = count > 0 ? sum / count : 0;
+  return count > 0 ? std::sqrt(std::max(0.0, squares / count - mean * mean)) : 1;
+}
+
+// Returns the variance of the error that no other row shares, with what keeps a density finite.
+double Follower::added_variance(std::size_t sensor) const {
+  const double floor = least_share * scale_[sensor];
+  double variance = floor * floor;
+  if (!supposed_.added_noise.empty()) variance += supposed_.added_noise[sensor] * supposed_.added_noise[sensor];
+  if (shared_[sensor] < 0) variance += supposed_.sensor_sd[sensor] * supposed_.sensor_sd[sensor];
+  return variance;
+}
+
+// The belief at a trial's first row: what was seen of it, else the launch; nothing is known of a state before.
+BeliefMixture::Part Follower::launched(const MachineRow& row) const {
+  const auto size = static_cast<Eigen::Index>(stepper_.size());
+  BeliefMixture::Part belief{0, Eigen::VectorXd::Zero(size + shared_count_),
+                             Eigen::MatrixXd::Zero(size + shared_count_, size + shared_count_), 1};
+  const auto states = static_cast<Eigen::Index>(stepper_.states());
+  for (const MachineLaunch& launch : machine_.launches) {
+    const auto s = static_cast<Eigen::Index>(machine_.state_index(launch.state));
+    belief.mean[s] = launch.mean;
+    belief.covariance(s, s) = launch.sd * launch.sd;
+  }
+  for (std::size_t i = 0; i < supposed_.spreads.size(); ++i) {
+    const auto at = states + static_cast<Eigen::Index>(i);
+    belief.covariance(at, at) = supposed_.spreads[i].sd * supposed_.spreads[i].sd;
+  }
+  for (Eigen::Index m = states + static_cast<Eigen::Index>(supposed_.spreads.size()); m < size; ++m)
+    belief.covariance(m, m) = 1;
+  for (std::size_t j = 0; j < state_.size(); ++j) {
+    const Eigen::Index s = state_[j];
+    if (shared_[j] >= 0) belief.covariance(size + shared_[j], size + shared_[j]) = 1;
+    if (std::isnan(row.seen[j])) continue;
+    belief.mean[s] = row.seen[j] - (supposed_.bias.empty() ? 0 : supposed_.bias[j]);
+    belief.covariance(s, s) = added_variance(j);
+    if (shared_[j] < 0) continue;
+    const auto [own, kept] = shared_error(machine_.observe[j].correlation);
+    const double sd = supposed_.sensor_sd[j];
+    belief.covariance(s, s) += sd * sd * (own * own + kept * kept);
+    belief.covariance(s, size + shared_[j]) = belief.covariance(size + shared_[j], s) = -sd * own;
+  }
+  return belief;
+}
+
+Look Follower::look(std::size_t sensor, Eigen::Index size) const {
+  Look look{Eigen::VectorXd::Zero(size), supposed_.bias.empty() ? 0 : supposed_.bias[sensor], added_variance(sensor)};
+  look.weights[state_[sensor]] = 1;
+  if (shared_[sensor] < 0) return look;
+  const auto [own, kept] = shared_error(machine_.observe[sensor].correlation);
+  const auto at = static_cast<Eigen::Index>(stepper_.size()) + shared_[sensor];
+  look.weights[at] = supposed_.sensor_sd[sensor] * own;
+  look.weights[at + shared_count_] = supposed_.sensor_sd[sensor] * kept;
+  return look;
+}
+
+void Follower::put(std::size_t event, const SeenValue& seen, double failed) {
+  out_.log_density[event] = seen.log_density;
+  out_.score[event] = seen.score;
+  out_.unit[event] = seen.unit;
+  if (chances_) (*chances_)[event] = failed;
+}
+
+// Sharpens the belief by a row and forgets the errors of the row before.
+BeliefMixture::Part Follower::see(AfterStep& after, const MachineRow& row) {
+  const Eigen::Index kept = static_cast<Eigen::Index>(stepper_.size()) + shared_count_;
+  double failed = plan_.failing ? after.failed : 0;
+  std::size_t& event = cursor_[trial_];
+  if (after.belief.parts().empty()) {  // it is sure to have failed, and did not
+    for (const double x : row.seen)
+      if (!std::isnan(x)) put(event++, out_of_reach, failed);
+    if (unseen(row) && plan_.failing) put(event++, out_of_reach, failed);
+    return launched(row);
+  }
+  if (unseen(row)) {
+    if (plan_.failing) put(event++, {std::log(std::max(least_chance, 1 - failed)), 0, 1}, failed);
+  } else {
+    after.belief.add_outlier(supposed_.outliers, outlier_width, static_cast<Eigen::Index>(stepper_.states()));
+    after.belief.add_wild(supposed_.wild, wild_width);
+    for (std::size_t j = 0; j < state_.size(); ++j) {
+      if (std::isnan(row.seen[j])) continue;
+      put(event++, after.belief.see(look(j, kept + shared_count_), row.seen[j], failed), failed);
+      failed = 0;
+    }
+  }
+  BeliefMixture::Part belief = after.belief.collapsed();
+  belief.mean.conservativeResize(kept);
+  belief.covariance.conservativeResize(kept, kept);
+  return belief;
+}
+
+Evaluation Follower::follow(const std::vector<Event>& events, std::vector<double>* chances) {
+  out_.log_density.assign(events.size(), 0.0);
+  out_.score = out_.unit = out_.log_density;
+  chances_ = chances;
+  if (chances) chances->assign(events.size(), 0.0);
+  cursor_.assign(runs_.trials.size(), events.size());
+  for (std::size_t e = events.size(); e-- > 0;) cursor_[events[e].trial] = e;
+  std::vector<BeliefMixture::Part> beliefs;
+  for (const MachineTrial& trial : runs_.trials)
+    beliefs.push_back(trial.rows.empty() ? BeliefMixture::Part{} : launched(trial.rows.front()));
+  BeliefStep stepping(stepper_, plan_, static_cast<std::size_t>(shared_count_));
+  for (std::size_t k = 0; k < runs_.longest(); ++k) {
+    std::vector<TransitionPlace> places;
+    std::vector<BeliefMixture::Part> before;
+    for (std::size_t t = 0; t < runs_.trials.size(); ++t)
+      if (steps_of(runs_.trials[t]) > k && (k + 1 < runs_.trials[t].rows.size() || plan_.failing)) {
+        places.push_back({t, k, first_[t] + k});
+        before.push_back(beliefs[t]);
+      }
+    if (places.empty()) break;
+    std::vector<AfterStep> after = stepping.step(places, before);
+    for (std::size_t i = 0; i < places.size(); ++i) {
+      trial_ = places[i].trial;
+      const MachineTrial& trial = runs_.trials[trial_];
+      if (k + 1 < trial.rows.size()) {
+        beliefs[trial_] = see(after[i], trial.rows[k + 1]);
+      } else {
+        const double chance = std::clamp(after[i].failed, least_chance, 1.0);
+        const double score = dynamics::normal_quantile(std::clamp(0.5 * chance, least_chance, 0.5));
+        put(cursor_[trial_]++, {std::log(chance), score, 1}, chance);
+      }
+    }
+  }
+  return std::move(out_);
+}
+
+}  // namespace
+
+std::vector<Event> machine_events(const Machine& machine, const MachineRuns& runs, const ScorePlan& plan) {
+  std::vector<Event> all;
+  for (std::size_t t = 0; t < runs.trials.size(); ++t) {
+    const MachineTrial& trial = runs.trials[t];
+    for (std::size_t k = 0; k < steps_of(trial); ++k) {
+      const MachineRow& row = trial.rows[k];
+      Event event;
+      event.trial = t;
+      event.condition = trial.condition;
+      event.number = static_cast<int>(k) + 1;
+      if (row.phase >= 0) event.leg = row.phase;
+      if (std::isfinite(row.position)) event.position = row.position;
+      if (k > 0 && std::isfinite(row.time) && std::isfinite(trial.rows[k - 1].time))
+        event.since_previous = row.time - trial.rows[k - 1].time;
+      const bool last = k + 1 == trial.rows.size();
+      if (last || unseen(trial.rows[k + 1])) {
+        event.kind = last ? EventKind::rest : EventKind::survival;
+        if (plan.failing) {
+          event.rested = last;
+          all.push_back(event);
+        }
+        continue;
+      }
+      bool first = true;
+      for (std::size_t j = 0; j < machine.observe.size(); ++j) {
+        if (std::isnan(trial.rows[k + 1].seen[j])) continue;
+        event.column = j;
+        event.speed = row.seen[j];
+        event.rested = first && plan.failing ? std::optional(false) : std::nullopt;
+        all.push_back(event);
+        first = false;
+      }
+    }
+  }
+  return all;
+}
+
+Evaluation follow_machine(const Machine& machine, const MachineRuns& runs, const ScorePlan& plan,
+                          const std::vector<Event>& events, const MachineHypothesis& supposed,
+                          std::vector<double>* chances) {
+  return Follower(machine, runs, plan, supposed).follow(events, chances);
+}
+
+}  // namespace metastable::analysis

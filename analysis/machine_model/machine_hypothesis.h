@@ -1,0 +1,50 @@
+#pragma once
+// What is supposed of a machine while its trials are followed: the values of its map, and what varies in them.
+
+#include <cstddef>
+#include <vector>
+
+namespace metastable::analysis {
+
+/// What is supposed. Where a list goes by transition, these are numbered over all trials: row k to k + 1 of the first
+/// trial, and so on.
+struct MachineHypothesis {
+  /// A value of the map that is more by so much in each transition.
+  struct Change {
+    std::size_t value;               // index of Machine::value_names()
+    std::vector<double> transition;  // added
+  };
+  /// A value that changes with a state.
+  struct StateLaw {
+    std::size_t value, state;
+    double slope, centre;  // added: slope (state - centre)
+  };
+  /// A value that differs from trial to trial.
+  struct Spread {
+    std::size_t value;
+    double sd;
+  };
+  /// A state that is pushed after each step.
+  struct Push {
+    std::size_t state;
+    std::vector<double> transition;  // added
+  };
+
+  std::vector<double> values;  ///< parameters and the effects' parameters
+  std::vector<Change> changes = {};
+  std::vector<StateLaw> laws = {};
+  std::vector<Spread> spreads = {};
+  std::vector<Push> pushes = {};
+  std::vector<double> scatter = {};      ///< by transition: scores are so many times as large; empty: 1
+  std::vector<double> memory = {};       ///< by score: correlation with the one before; empty: 0
+  std::vector<double> sensor_sd = {};    ///< by sensor
+  std::vector<double> added_noise = {};  ///< by sensor: sd of an error beside it
+  std::vector<double> bias = {};         ///< by sensor: what is seen is so much more than the state
+  double outliers = 0;                   ///< share of steps whose scores are drawn wide
+  double wild = 0;                       ///< share of rows that say nothing of the state
+};
+
+inline constexpr double outlier_width = 4;  ///< sd of the scores of an outlier
+inline constexpr double wild_width = 10;    ///< sd of a wild row, in sds of what was expected there
+
+}  // namespace metastable::analysis

@@ -1,0 +1,206 @@
+#include "analysis/machine_model/machine_runs.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <map>
+#include <numbers>
+#include <stdexcept>
+
+#include "analysis/statistics/median.h"
+
+namespace metastable::analysis {
+namespace {
+
+// A column whose values are this many times what the map makes of them is in another unit; the factor is met within a
+// share.
+struct UnitFactor {
+  double factor;
+  const char* words;
+};
+constexpr UnitFactor unit_factors[]{{180 / std::numbers::pi, "degrees where the machine has radians"},
+                                    {std::numbers::pi / 180, "radians where the machine has degrees"},
+                                    {1000, "thousandths of the machine's unit"},
+                                    {0.001, "thousands of the machine's unit"}};
+constexpr double factor_share = 0.15;
+
+template <class Known>
+bool every_row(const MachineRuns& runs, Known known) {
+  return !runs.trials.empty() && std::ranges::all_of(runs.trials, [&](const MachineTrial& trial) {
+    return std::ranges::all_of(trial.rows, known);
+  });
+}
+
+void require_shape(const Machine& machine, const MachineRuns& runs) {
+  for (std::size_t t = 0; t < runs.trials.size(); ++t)
+    for (const MachineRow& row : runs.trials[t].rows) {
+      if (row.seen.size() != machine.observe.size() || row.inputs.size() != machine.inputs.size())
+        throw std::invalid_argument(fmt::format("trial {}: a row has {} states and {} inputs where {} and {} belong",
+                                                t + 1, row.seen.size(), row.inputs.size(), machine.observe.size(),
+                                                machine.inputs.size()));
+      if (std::ranges::any_of(row.seen, [](double x) { return std::isinf(x); }))
+        throw std::invalid_argument(fmt::format("trial {}: a state is infinite", t + 1));
+      if (!std::ranges::all_of(row.inputs, [](double x) { return std::isfinite(x); }))
+        throw std::invalid_argument(fmt::format("trial {}: an input is not a finite number", t + 1));
+    }
+}
+
+void require_launch(const Machine& machine, const MachineRuns& runs) {
+  for (std::size_t s = 0; s < machine.states.size(); ++s) {
+    const std::string& state = machine.states[s];
+    if (std::ranges::find(machine.launches, state, &MachineLaunch::state) != machine.launches.end()) continue;
+    const auto sensor = std::ranges::find(machine.observe, state, &MachineSensor::state);
+    if (sensor == machine.observe.end())
+      throw std::invalid_argument(
+          fmt::format("launch: {} is not measured, so that its first value has to be given "
+                      "with its sd",
+                      state));
+    const auto j = static_cast<std::size_t>(sensor - machine.observe.begin());
+    for (std::size_t t = 0; t < runs.trials.size(); ++t)
+      if (runs.trials[t].rows.size() > 1 && std::isnan(runs.trials[t].rows.front().seen[j]))
+        throw std::invalid_argument(
+            fmt::format("launch: trial {} begins without {}, so that its first value has to be "
+                        "given with its sd",
+                        t + 1, state));
+  }
+}
+
+std::vector<double> column(const MachineRuns& runs, std::size_t sensor) {
+  std::vector<double> values;
+  for (const MachineTrial& trial : runs.trials)
+    for (const MachineRow& row : trial.rows)
+      if (!std::isnan(row.seen[sensor])) values.push_back(row.seen[sensor]);
+  return values;
+}
+
+bool same(const MachineTrial& a, const MachineTrial& b) {
+  if (a.rows.size() != b.rows.size() || a.rows.size() < 3) return false;
+  for (std::size_t k = 0; k < a.rows.size(); ++k)
+    for (std::size_t j = 0; j < a.rows[k].seen.size(); ++j) {
+      const double x = a.rows[k].seen[j], y = b.rows[k].seen[j];
+      if (!(x == y) && !(std::isnan(x) && std::isnan(y))) return false;
+    }
+  return true;
+}
+
+std::vector<std::string> doubled_trials(const MachineRuns& runs) {
+  std::multimap<double, std::size_t> by_first;
+  std::size_t doubled = 0;
+  for (std::size_t t = 0; t < runs.trials.size(); ++t) {
+    if (runs.trials[t].rows.empty() || runs.trials[t].rows[0].seen.empty()) continue;
+    const double first = runs.trials[t].rows[0].seen[0];
+    const auto [from, to] = by_first.equal_range(first);
+    doubled += std::any_of(from, to, [&](const auto& at) { return same(runs.trials[at.second], runs.trials[t]); });
+    by_first.emplace(first, t);
+  }
+  if (doubled == 0) return {};
+  return {fmt::format("{} of {} trials are there twice, number by number: was one set of data brought in twice?",
+                      doubled, runs.trials.size())};
+}
+
+// Puts the measured next values beside those of the nominal map, in the middle of its noise, and asks whether one
+// column is a unit's factor of the other.
+std::vector<std::string> other_units(const Machine& machine, const MachineRuns& runs) {
+  const std::size_t d = machine.states.size();
+  std::vector<double> states, scores, next;
+  std::vector<std::vector<double>> values(machine.value_names().size());
+  std::vector<const MachineRow*> after;
+  const std::size_t inputs = values.size() - machine.inputs.size();
+  for (const MachineTrial& trial : runs.trials)
+    for (std::size_t k = 0; k + 1 < trial.rows.size(); ++k) {
+      std::vector<double> state(d, 0.0);
+      for (const MachineLaunch& launch : machine.launches) state[machine.state_index(launch.state)] = launch.mean;
+      bool known = true;
+      for (std::size_t j = 0; j < machine.observe.size(); ++j) {
+        known = known && !std::isnan(trial.rows[k].seen[j]);
+        state[machine.state_index(machine.observe[j].state)] = trial.rows[k].seen[j];
+      }
+      if (!known) continue;
+      states.insert(states.end(), state.begin(), state.end());
+      after.push_back(&trial.rows[k + 1]);
+      for (std::size_t i = 0; i < machine.inputs.size(); ++i) values[inputs + i].push_back(trial.rows[k].inputs[i]);
+    }
+  if (after.empty()) return {};
+  std::size_t v = 0;
+  for (const MachineParameter& p : machine.parameters) values[v++] = {p.nominal};
+  for (const MachineEffect& effect : machine.effects)
+    for (const SuspectedParameter& p : effect.parameters) values[v++] = {p.neutral};
+  scores.assign(after.size() * static_cast<std::size_t>(machine.scores), 0.0);
+  next.resize(states.size());
+  std::vector<std::uint8_t> failed(after.size());
+  const std::vector<std::span<const double>> spans(values.begin(), values.end());
+  machine.step({after.size(), states, scores, spans, next, failed});
+  std::vector<std::string> said;
+  for (std::size_t j = 0; j < machine.observe.size(); ++j) {
+    const std::size_t s = machine.state_index(machine.observe[j].state);
+    std::vector<double> ratios;
+    for (std::size_t i = 0; i < after.size(); ++i)
+      if (!failed[i] && !std::isnan(after[i]->seen[j]) && next[i * d + s] != 0)
+        ratios.push_back(after[i]->seen[j] / next[i * d + s]);
+    if (ratios.size() < 10) continue;
+    const double ratio = median(std::move(ratios));
+    for (const UnitFactor& unit : unit_factors)
+      if (std::abs(std::log(std::abs(ratio) / unit.factor)) < factor_share)
+        said.push_back(
+            fmt::format("{}: the measured values are {:.3g} times what the machine makes of the rows before "
+                        "them: are they in {}?",
+                        machine.observe[j].state, ratio, unit.words));
+  }
+  return said;
+}
+
+}  // namespace
+
+std::size_t steps_of(const MachineTrial& trial) {
+  return trial.rows.empty() ? 0 : trial.rows.size() - 1 + (trial.outcome == MachineOutcome::failed ? 1 : 0);
+}
+
+std::size_t MachineRuns::transitions() const {
+  std::size_t count = 0;
+  for (const MachineTrial& trial : trials) count += trial.rows.empty() ? 0 : trial.rows.size() - 1;
+  return count;
+}
+
+std::size_t MachineRuns::longest() const {
+  std::size_t most = 0;
+  for (const MachineTrial& trial : trials) most = std::max(most, trial.rows.size());
+  return most;
+}
+
+bool MachineRuns::timed() const {
+  return every_row(*this, [](const MachineRow& row) { return std::isfinite(row.time); });
+}
+
+bool MachineRuns::placed() const {
+  return every_row(*this, [](const MachineRow& row) { return std::isfinite(row.position); });
+}
+
+std::vector<std::string> look_over(const Machine& machine, const MachineRuns& runs) {
+  machine.require_valid();
+  require_shape(machine, runs);
+  const std::size_t transitions = runs.transitions();
+  if (transitions == 0)
+    throw std::invalid_argument("runs: no trial has two rows one after the other: there is no transition");
+  const auto fitted = static_cast<std::size_t>(
+      std::ranges::count_if(machine.parameters, [](const MachineParameter& p) { return p.sd > 0; }));
+  if (transitions < fitted)
+    throw std::invalid_argument(
+        fmt::format("runs: {} transitions are fewer than the {} parameters to be refitted", transitions, fitted));
+  require_launch(machine, runs);
+  std::vector<std::string> said;
+  for (std::size_t j = 0; j < machine.observe.size(); ++j) {
+    const std::vector<double> values = column(runs, j);
+    if (values.size() < 2)
+      throw std::invalid_argument(fmt::format("runs: {} has {} values", machine.observe[j].state, values.size()));
+    const auto [least, most] = std::ranges::minmax(values);
+    if (least == most)
+      throw std::invalid_argument(fmt::format("runs: {} is {} in every row: a column that is constant says nothing",
+                                              machine.observe[j].state, least));
+  }
+  for (std::string& sentence : doubled_trials(runs)) said.push_back(std::move(sentence));
+  for (std::string& sentence : other_units(machine, runs)) said.push_back(std::move(sentence));
+  return said;
+}
+
+}  // namespace metastable::analysis

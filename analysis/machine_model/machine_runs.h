@@ -1,0 +1,59 @@
+#pragma once
+// What was measured of a machine: trials, row by row.
+
+#include <cstddef>
+#include <limits>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "analysis/machine_model/machine.h"
+
+namespace metastable::analysis {
+
+enum class MachineOutcome { failed, stopped, lost };
+
+/// What is known of a state, between two steps. NaN: not known.
+struct MachineRow {
+  std::vector<double> seen;                                    ///< [Machine::observe]
+  double time = std::numeric_limits<double>::quiet_NaN();      ///< [s] by one clock for all trials
+  double position = std::numeric_limits<double>::quiet_NaN();  ///< [m]
+  int phase = -1;                                              ///< index of MachineRuns::phases; -1: none
+  std::vector<int> labels = {};                                ///< by label: index of its value; -1: none
+  std::vector<double> inputs = {};                             ///< [Machine::inputs] of the step from this row on
+};
+
+struct MachineTrial {
+  std::size_t condition = 0;
+  std::optional<MachineOutcome> outcome = {};  ///< nothing: not known
+  std::vector<MachineRow> rows;                ///< row k is the state after k steps
+};
+
+/// Counts the steps of a trial: to each row from the one before, and one more into failure.
+std::size_t steps_of(const MachineTrial& trial);
+
+/// A column of labels: a crew, a floor, a controller.
+struct MachineLabel {
+  std::string name;
+  std::vector<std::string> values;
+};
+
+struct MachineRuns {
+  std::vector<std::string> conditions = {"all"};
+  std::vector<std::string> phases;  ///< names, in order; empty: not known
+  std::vector<MachineLabel> labels;
+  std::vector<MachineTrial> trials;  ///< in the order they were run
+
+  std::size_t transitions() const;  ///< from one row to the next, in all trials
+  std::size_t longest() const;      ///< rows of the longest trial
+  bool timed() const;               ///< every row has its time
+  bool placed() const;              ///< every row has its position
+};
+
+/// Says what of the runs does not look like this machine's: columns in other units, a column that is constant, trials
+/// that are there twice; a sentence each.
+/// @throws std::invalid_argument where they do not fit the machine: no transition, fewer rows than parameters, rows of
+///   another shape, a first row that lacks a state without launch
+std::vector<std::string> look_over(const Machine& machine, const MachineRuns& runs);
+
+}  // namespace metastable::analysis

@@ -1,0 +1,178 @@
+#include "analysis/machine_model/machine_simulation.h"
+
+#include <Eigen/Core>
+#include <algorithm>
+#include <cmath>
+#include <utility>
+
+#include "analysis/machine_model/machine_stepper.h"
+#include "analysis/machine_model/shared_error.h"
+#include "analysis/statistics/random.h"
+#include "dynamics/numerics/truncated_normal.h"
+
+namespace metastable::analysis {
+namespace {
+
+// Draws numbers of one trial by row and purpose.
+class Draws {
+ public:
+  Draws(std::uint64_t seed, std::size_t trial) : seed_(seed), trial_(trial) {}
+  double uniform(std::size_t row, std::size_t purpose) const {
+    return uniform_at(seed_, trial_, row * most_purposes + purpose, static_cast<std::uint64_t>(DrawStream::machine));
+  }
+  double normal(std::size_t row, std::size_t purpose) const { return dynamics::normal_quantile(uniform(row, purpose)); }
+
+ private:
+  static constexpr std::size_t most_purposes = 256;
+  std::uint64_t seed_;
+  std::size_t trial_;
+};
+
+// What a number is drawn for; scores, sensors and offsets follow one another from these.
+enum Purpose : std::size_t { outlier, wild, scores, errors = 32, added = 96, offsets = 160, earlier = 200 };
+
+// A trial under way.
+struct Walking {
+  Eigen::VectorXd point;   // as MachineStepper's
+  Eigen::VectorXd errors;  // by sensor: of this row
+  bool over = false;
+};
+
+class Walker {
+ public:
+  Walker(const Machine& machine, const MachineRuns& runs, const MachineHypothesis& supposed, std::uint64_t seed)
+      : machine_(machine), runs_(runs), supposed_(supposed), seed_(seed), stepper_(machine, runs_, supposed) {}
+  MachineRuns walk();
+
+ private:
+  std::size_t planned(std::size_t trial) const;
+  const MachineRow& design_row(std::size_t trial, std::size_t row) const;
+  Walking launched(std::size_t trial) const;
+  double error(std::size_t sensor, double now, double before) const;
+  MachineRow seen(std::size_t trial, std::size_t row, Walking& walking) const;
+
+  const Machine& machine_;
+  const MachineRuns& runs_;
+  const MachineHypothesis& supposed_;
+  std::uint64_t seed_;
+  MachineStepper stepper_;
+};
+
+std::size_t Walker::planned(std::size_t trial) const {
+  return runs_.trials[trial].outcome == MachineOutcome::failed ? runs_.longest() : runs_.trials[trial].rows.size();
+}
+
+// Rows beyond those that were measured are as the longest trial's.
+const MachineRow& Walker::design_row(std::size_t trial, std::size_t row) const {
+  if (row < runs_.trials[trial].rows.size()) return runs_.trials[trial].rows[row];
+  return std::ranges::max_element(runs_.trials, {}, [](const MachineTrial& t) { return t.rows.size(); })->rows[row];
+}
+
+double Walker::error(std::size_t sensor, double now, double before) const {
+  const auto [own, kept] = shared_error(machine_.observe[sensor].correlation);
+  return supposed_.sensor_sd[sensor] * (own * now + kept * before);
+}
+
+Walking Walker::launched(std::size_t trial) const {
+  const Draws draws(seed_, trial);
+  const MachineRow& row = runs_.trials[trial].rows.front();
+  Walking walking{Eigen::VectorXd::Zero(static_cast<Eigen::Index>(stepper_.size())),
+                  Eigen::VectorXd::Zero(static_cast<Eigen::Index>(machine_.observe.size())), false};
+  for (std::size_t l = 0; l < machine_.launches.size(); ++l)
+    walking.point[static_cast<Eigen::Index>(machine_.state_index(machine_.launches[l].state))] =
+        machine_.launches[l].mean + machine_.launches[l].sd * draws.normal(0, earlier + l);
+  for (std::size_t j = 0; j < machine_.observe.size(); ++j) {
+    const auto at = static_cast<Eigen::Index>(j);
+    walking.errors[at] = draws.normal(0, errors + j);
+    if (std::isnan(row.seen[j])) continue;
+    double off = error(j, walking.errors[at], draws.normal(0, earlier + j));
+    if (!supposed_.added_noise.empty()) off += supposed_.added_noise[j] * draws.normal(0, added + j);
+    if (!supposed_.bias.empty()) off += supposed_.bias[j];
+    walking.point[static_cast<Eigen::Index>(machine_.state_index(machine_.observe[j].state))] = row.seen[j] - off;
+  }
+  Eigen::Index at = static_cast<Eigen::Index>(stepper_.states());
+  for (std::size_t i = 0; i < supposed_.spreads.size(); ++i, ++at)
+    walking.point[at] = supposed_.spreads[i].sd * draws.normal(0, offsets + i);
+  for (std::size_t m = 0; at < walking.point.size(); ++at, ++m) walking.point[at] = draws.normal(0, scores + m);
+  return walking;
+}
+
+// What is seen of a row, with its errors and what is missing.
+MachineRow Walker::seen(std::size_t trial, std::size_t row, Walking& walking) const {
+  const Draws draws(seed_, trial);
+  MachineRow out = design_row(trial, row);
+  const bool is_wild = draws.uniform(row, wild) < supposed_.wild;
+  for (std::size_t j = 0; j < machine_.observe.size(); ++j) {
+    const auto at = static_cast<Eigen::Index>(j);
+    const double before = walking.errors[at];
+    walking.errors[at] = draws.normal(row, errors + j);
+    if (std::isnan(out.seen[j])) continue;
+    double off = error(j, walking.errors[at], before);
+    if (!supposed_.added_noise.empty()) off += supposed_.added_noise[j] * draws.normal(row, added + j);
+    if (is_wild) off *= wild_width;
+    if (!supposed_.bias.empty()) off += supposed_.bias[j];
+    out.seen[j] = walking.point[static_cast<Eigen::Index>(machine_.state_index(machine_.observe[j].state))] + off;
+  }
+  return out;
+}
+
+MachineRuns Walker::walk() {
+  MachineRuns out = runs_;
+  std::vector<Walking> walking;
+  std::vector<std::size_t> first;
+  std::size_t number = 0;
+  for (std::size_t t = 0; t < runs_.trials.size(); ++t) {
+    first.push_back(number);
+    number += steps_of(runs_.trials[t]);
+    if (runs_.trials[t].rows.empty()) {
+      walking.push_back({{}, {}, true});
+      continue;
+    }
+    walking.push_back(launched(t));
+    out.trials[t].rows.resize(1);
+    if (out.trials[t].outcome == MachineOutcome::failed) out.trials[t].outcome = MachineOutcome::stopped;
+  }
+  for (std::size_t k = 0; k + 1 < std::max<std::size_t>(2, runs_.longest()); ++k) {
+    stepper_.clear();
+    std::vector<std::size_t> who;
+    for (std::size_t t = 0; t < walking.size(); ++t) {
+      if (walking[t].over || k + 1 >= planned(t)) continue;
+      const Draws draws(seed_, t);
+      Eigen::VectorXd fresh(static_cast<Eigen::Index>(stepper_.scores()));
+      const double width = draws.uniform(k + 1, outlier) < supposed_.outliers ? outlier_width : 1;
+      for (std::size_t m = 0; m < stepper_.scores(); ++m)
+        fresh[static_cast<Eigen::Index>(m)] = width * draws.normal(k + 1, scores + m);
+      const std::size_t known = std::max<std::size_t>(1, steps_of(runs_.trials[t])) - 1;
+      const std::size_t row = std::min(k, runs_.trials[t].rows.size() - 1);
+      stepper_.add({t, row, first[t] + std::min(k, known)}, walking[t].point, fresh);
+      for (std::size_t m = 0; stepper_.remembers() && m < stepper_.scores(); ++m) {
+        double& before = walking[t].point[static_cast<Eigen::Index>(stepper_.states() + stepper_.offsets() + m)];
+        const double kept = stepper_.memory(m);
+        before = kept * before + std::sqrt(1 - kept * kept) * fresh[static_cast<Eigen::Index>(m)];
+      }
+      who.push_back(t);
+    }
+    if (who.empty()) break;
+    stepper_.run();
+    for (std::size_t i = 0; i < who.size(); ++i) {
+      Walking& one = walking[who[i]];
+      if (stepper_.failed(i)) {
+        one.over = true;
+        out.trials[who[i]].outcome = MachineOutcome::failed;
+        continue;
+      }
+      one.point.head(static_cast<Eigen::Index>(stepper_.states())) = stepper_.next(i);
+      out.trials[who[i]].rows.push_back(seen(who[i], k + 1, one));
+    }
+  }
+  return out;
+}
+
+}  // namespace
+
+MachineRuns simulate_machine(const Machine& machine, const MachineRuns& runs, const MachineHypothesis& supposed,
+                             std::uint64_t seed) {
+  return Walker(machine, runs, supposed, seed).walk();
+}
+
+}  // namespace metastable::analysis

@@ -1,0 +1,57 @@
+#pragma once
+// Steps a machine from many points of its trials in one call.
+
+#include <Eigen/Core>
+#include <cstdint>
+#include <vector>
+
+#include "analysis/machine_model/machine.h"
+#include "analysis/machine_model/machine_hypothesis.h"
+#include "analysis/machine_model/machine_runs.h"
+
+namespace metastable::analysis {
+
+/// The place of a transition: its trial, the row it starts from, and its number over all trials.
+struct TransitionPlace {
+  std::size_t trial = 0, row = 0, number = 0;
+};
+
+/// Gathers points, each a state with what differs in its trial and the scores before, and steps them together.
+class MachineStepper {
+ public:
+  MachineStepper(const Machine& machine, const MachineRuns& runs, const MachineHypothesis& supposed);
+
+  std::size_t states() const { return machine_.states.size(); }
+  std::size_t scores() const { return static_cast<std::size_t>(machine_.scores); }
+  std::size_t offsets() const { return supposed_.spreads.size(); }
+  bool remembers() const { return !supposed_.memory.empty(); }
+  double memory(std::size_t score) const { return remembers() ? supposed_.memory[score] : 0; }
+  /// Counts what a point holds: states, then offsets of values, then the scores before, where these are remembered.
+  std::size_t size() const { return states() + offsets() + (remembers() ? scores() : 0); }
+
+  void clear();
+  /// Adds a point. @param point  [size()] @param fresh  [scores()] normal scores of this step
+  void add(const TransitionPlace& place, const Eigen::VectorXd& point, const Eigen::VectorXd& fresh);
+  /// Steps all points added. A state that is not finite counts as failed.
+  void run();
+  /// Says whether it counts as failed for want of a finite state alone.
+  bool lost(std::size_t point) const;
+  /// Returns the next states of a point, and whether it failed.
+  Eigen::Map<const Eigen::VectorXd> next(std::size_t point) const;
+  bool failed(std::size_t point) const { return failed_[point] != 0; }
+
+ private:
+  double value_at(std::size_t value, const TransitionPlace& place, const Eigen::VectorXd& point) const;
+
+  const Machine& machine_;
+  const MachineRuns& runs_;
+  const MachineHypothesis& supposed_;
+  std::vector<double> lower_, upper_;  // of the values
+  std::vector<char> varies_;           // by value: differs from row to row
+  std::vector<double> states_, scores_, next_;
+  std::vector<std::vector<double>> values_;  // by value
+  std::vector<std::uint8_t> failed_;
+  std::vector<TransitionPlace> places_;
+};
+
+}  // namespace metastable::analysis

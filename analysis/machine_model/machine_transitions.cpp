@@ -1,0 +1,224 @@
+#include "analysis/machine_model/machine_transitions.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <stdexcept>
+#include <utility>
+
+#include "analysis/machine_model/machine_design.h"
+#include "analysis/machine_model/machine_effects.h"
+#include "analysis/machine_model/machine_filter.h"
+#include "analysis/machine_model/machine_simulation.h"
+#include "analysis/machine_model/machine_variations.h"
+
+namespace metastable::analysis {
+namespace {
+
+constexpr double least_sensor = 1e-6, usual_sensor = 0.1;  // sd of an error that is not stated, in sds of its change
+constexpr double sensor_prior = 3;                         // sd of its logarithm
+constexpr double usual_wild = -7, wild_prior = 1.5, least_wild = -12;  // logit of the share of wild rows
+constexpr double parameter_step = 1e-3;  // of the sd with which it is known, for differences
+constexpr double widest_refit = 20;          // that a parameter is refitted by
+constexpr double seen_share = 1e-6;      // of a column's change, that its noise or its error must exceed
+
+double share_of(double logit) { return 1 / (1 + std::exp(-logit)); }
+
+class MachineTransitions : public TransitionModel {
+ public:
+  MachineTransitions(std::shared_ptr<const Machine> machine, MachineRuns runs)
+      : machine_(std::move(machine)), runs_(std::move(runs)) {
+    notes_ = look_over(*machine_, runs_);
+    design_ = std::make_shared<MachineDesign>(machine_design(*machine_, runs_));
+    set_up_nuisances();
+    plan_ = score_plan(*machine_, runs_, hypothesis(nominal_values(*this), {}));
+    if (plan_.failing && plan_.lattice.size() > 1)
+      notes_.push_back("failures are sought along one of the noises; the others are held to a lattice");
+    set_up_effects();
+    list_events();
+    require_noise();
+  }
+
+  const std::vector<Event>& events() const override { return events_; }
+  std::size_t trials() const override { return runs_.trials.size(); }
+  std::size_t conditions() const override { return runs_.conditions.size(); }
+  int legs() const override { return static_cast<int>(runs_.phases.size()); }
+  bool time_tells() const override { return false; }
+  std::string condition_name(std::size_t condition) const override { return runs_.conditions.at(condition); }
+  std::string recalibrated() const override { return "parameters"; }
+  std::vector<ObservedColumn> columns() const override {
+    std::vector<ObservedColumn> all;
+    for (const MachineSensor& sensor : machine_->observe) all.push_back({sensor.state, ""});
+    return all;
+  }
+  std::string leg_name() const override { return "phase"; }
+  std::string leg_word(int leg) const override { return "phase " + runs_.phases.at(static_cast<std::size_t>(leg)); }
+  const std::vector<Nuisance>& nuisances() const override { return nuisances_; }
+  const std::vector<Candidate>& candidates() const override { return candidates_; }
+  const std::vector<Variation>& variations() const override { return variations_; }
+  bool refits_noise() const override {
+    return std::ranges::any_of(machine_->observe, [](const MachineSensor& s) { return !s.sd; });
+  }
+  Evaluation evaluate(std::span<const double> nuisance, std::span<const EffectTerm> terms) const override {
+    return follow_machine(*machine_, runs_, plan_, events_, hypothesis(nuisance, terms));
+  }
+  std::vector<double> rest_chances(std::span<const double> nuisance, std::span<const EffectTerm> terms) const override {
+    std::vector<double> chances;
+    follow_machine(*machine_, runs_, plan_, events_, hypothesis(nuisance, terms), &chances);
+    return chances;
+  }
+  std::unique_ptr<TransitionModel> simulate(std::span<const double> nuisance, std::span<const EffectTerm> terms,
+                                            std::uint64_t seed) const override {
+    return drawn(nuisance, terms, seed);
+  }
+  std::vector<std::pair<std::string, std::unique_ptr<TransitionModel>>> alternatives(
+      std::span<const double> nuisance, std::uint64_t seed) const override {
+    std::vector<std::pair<std::string, std::unique_ptr<TransitionModel>>> all;
+    all.emplace_back("the same experiment once more", drawn(nuisance, {}, seed));
+    return all;
+  }
+  std::pair<double, double> rests() const override {
+    double at_risk = 0, failed = 0;
+    for (const Event& e : events_) {
+      at_risk += e.rested.has_value();
+      failed += e.rested.value_or(false);
+    }
+    return {at_risk, failed};
+  }
+  double expected_steps(std::span<const double> nuisance, std::span<const EffectTerm> terms,
+                        std::uint64_t seed) const override;
+  const std::vector<std::string>& notes() const override { return notes_; }
+  std::vector<NamedValue> report_nuisances(std::span<const double> nuisance) const override;
+
+ private:
+  std::unique_ptr<MachineTransitions> drawn(std::span<const double> nuisance, std::span<const EffectTerm> terms,
+                                            std::uint64_t seed) const;
+  MachineHypothesis hypothesis(std::span<const double> nuisance, std::span<const EffectTerm> terms) const;
+  void set_up_nuisances();
+  void set_up_effects();
+  void list_events() { events_ = machine_events(*machine_, runs_, plan_); }
+  void require_noise() const;
+
+  std::shared_ptr<const Machine> machine_;
+  MachineRuns runs_;
+  std::shared_ptr<const MachineDesign> design_;
+  ScorePlan plan_;
+  std::vector<Event> events_;
+  std::vector<Nuisance> nuisances_;  // parameters whose sd is above 0, sensors without sd, wild rows
+  std::vector<MachineCandidate> effects_;
+  std::vector<Candidate> candidates_;
+  std::vector<MachineVariation> varied_;
+  std::vector<Variation> variations_;
+  std::vector<std::string> notes_;
+};
+
+void MachineTransitions::set_up_nuisances() {
+  for (const MachineParameter& p : machine_->parameters)
+    if (p.sd > 0)
+      nuisances_.push_back({p.name, p.nominal, p.sd, parameter_step * p.sd,
+                            std::max(p.lower, p.nominal - widest_refit * p.sd),
+                            std::min(p.upper, p.nominal + widest_refit * p.sd)});
+  for (std::size_t j = 0; j < machine_->observe.size(); ++j) {
+    if (machine_->observe[j].sd) continue;
+    const double change = design_->change[j] > 0 ? design_->change[j] : 1;
+    nuisances_.push_back({"log sensor sd of " + machine_->observe[j].state, std::log(usual_sensor * change),
+                          sensor_prior, 1e-3, std::log(least_sensor * change), std::log(change)});
+    nuisances_.back().assumed = true;
+  }
+  if (machine_->most_wild > 0)
+    nuisances_.push_back({"logit wild_share", usual_wild, wild_prior, 1e-2, least_wild,
+                          std::log(machine_->most_wild / (1 - machine_->most_wild))});
+}
+
+void MachineTransitions::set_up_effects() {
+  effects_ = machine_effects(*machine_, design_);
+  varied_ = machine_variations(*machine_, design_);
+  for (const MachineCandidate& one : effects_) candidates_.push_back(one.candidate);
+  for (const MachineVariation& one : varied_) variations_.push_back(one.variation);
+}
+
+MachineHypothesis MachineTransitions::hypothesis(std::span<const double> nuisance,
+                                                 std::span<const EffectTerm> terms) const {
+  MachineHypothesis h;
+  std::size_t slot = 0;
+  for (const MachineParameter& p : machine_->parameters) h.values.push_back(p.sd > 0 ? nuisance[slot++] : p.nominal);
+  for (const MachineEffect& effect : machine_->effects)
+    for (const SuspectedParameter& p : effect.parameters) h.values.push_back(p.neutral);
+  for (const MachineSensor& sensor : machine_->observe)
+    h.sensor_sd.push_back(sensor.sd ? *sensor.sd : std::exp(nuisance[slot++]));
+  if (machine_->most_wild > 0) h.wild = share_of(nuisance[slot]);
+  for (const EffectTerm& term : terms) {
+    const auto named = [&](const auto& one) { return one.id == term.candidate->id; };
+    if (const auto at = std::ranges::find_if(candidates_, named); at != candidates_.end())
+      effects_[static_cast<std::size_t>(at - candidates_.begin())].apply(h, term.variant, term.values);
+    else
+      for (const MachineVariation& one : varied_)
+        if (named(one.variation.candidate)) one.apply(h, term.variant, term.values);
+  }
+  return h;
+}
+
+// A state that the map foretells exactly and that is measured exactly has no density.
+void MachineTransitions::require_noise() const {
+  const Evaluation evaluation = evaluate(nominal_values(*this), {});
+  for (std::size_t j = 0; j < machine_->observe.size(); ++j) {
+    double most = 0;
+    for (std::size_t e = 0; e < events_.size(); ++e)
+      if (events_[e].column == j && (events_[e].kind == EventKind::step)) most = std::max(most, evaluation.unit[e]);
+    if (!(most > seen_share * design_->change[j]))
+      throw std::invalid_argument(
+          fmt::format("sensor: {}: neither the machine's noise nor an error of measurement "
+                      "reaches it: state the sd of its error, or None to have it fitted",
+                      machine_->observe[j].state));
+  }
+}
+
+std::unique_ptr<MachineTransitions> MachineTransitions::drawn(std::span<const double> nuisance,
+                                                              std::span<const EffectTerm> terms,
+                                                              std::uint64_t seed) const {
+  auto copy = std::make_unique<MachineTransitions>(*this);
+  copy->runs_ = simulate_machine(*machine_, runs_, hypothesis(nuisance, terms), seed);
+  copy->design_ = std::make_shared<MachineDesign>(machine_design(*machine_, copy->runs_));
+  copy->effects_.clear();
+  copy->candidates_.clear();
+  copy->varied_.clear();
+  copy->variations_.clear();
+  copy->set_up_effects();
+  copy->list_events();
+  return copy;
+}
+
+double MachineTransitions::expected_steps(std::span<const double> nuisance, std::span<const EffectTerm> terms,
+                                          std::uint64_t seed) const {
+  if (!plan_.failing) return std::numeric_limits<double>::infinity();
+  const auto trials = drawn(nuisance, terms, seed);
+  const std::vector<double> chances = trials->rest_chances(nuisance, terms);
+  double at_risk = 0, expected = 0;
+  for (std::size_t e = 0; e < chances.size(); ++e)
+    if (trials->events_[e].rested) {
+      ++at_risk;
+      expected += chances[e];
+    }
+  return expected > 0 ? at_risk / expected : std::numeric_limits<double>::infinity();
+}
+
+std::vector<NamedValue> MachineTransitions::report_nuisances(std::span<const double> nuisance) const {
+  std::vector<NamedValue> all;
+  std::size_t slot = 0;
+  for (const MachineParameter& p : machine_->parameters)
+    if (p.sd > 0) all.emplace_back(p.name, nuisance[slot++]);
+  for (const MachineSensor& sensor : machine_->observe)
+    if (!sensor.sd) all.emplace_back("sensor_sd_" + sensor.state, std::exp(nuisance[slot++]));
+  if (machine_->most_wild > 0) all.emplace_back("wild_share", share_of(nuisance[slot]));
+  return all;
+}
+
+}  // namespace
+
+std::unique_ptr<TransitionModel> machine_transitions(std::shared_ptr<const Machine> machine, MachineRuns runs) {
+  return std::make_unique<MachineTransitions>(std::move(machine), std::move(runs));
+}
+
+}  // namespace metastable::analysis

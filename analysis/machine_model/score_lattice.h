@@ -1,0 +1,30 @@
+#pragma once
+// A lattice of normal scores: where a map bends in its scores, the next state is a mixture over the lattice's cells,
+// each of which is normal; where the map fails for some scores, cells are cut at the edge.
+
+#include <cstddef>
+#include <span>
+#include <utility>
+#include <vector>
+
+namespace metastable::analysis {
+
+/// One axis of a lattice: the standard normal as a mixture of normals of sd `spread` at equal distances, exact to 1e-7
+/// of its density out to five sds. The first and last points serve for slopes only.
+struct LatticeAxis {
+  double spread = 0, spacing = 0;
+  std::vector<double> points;   ///< ascending
+  std::vector<double> weights;  ///< of the cells, 0 for the first and the last; they add up to 1
+};
+
+/// @param axes  of the lattice: the more, the coarser they are, 1 or 2
+LatticeAxis lattice_axis(int axes);
+
+/// The part of a cell, N(centre, spread^2), inside some intervals.
+struct CellPart {
+  double mass = 1, mean = 0, variance = 0;
+};
+/// @param inside  intervals, ascending
+CellPart cell_part(double centre, double spread, std::span<const std::pair<double, double>> inside);
+
+}  // namespace metastable::analysis

@@ -1,0 +1,26 @@
+#pragma once
+// Which of a step's scores a machine's map bends in, and in which it fails.
+
+#include <cstddef>
+#include <optional>
+#include <vector>
+
+#include "analysis/machine_model/machine.h"
+#include "analysis/machine_model/machine_hypothesis.h"
+#include "analysis/machine_model/machine_runs.h"
+
+namespace metastable::analysis {
+
+/// Scores that are taken by a lattice, at most two, and the one along which the edge of failure is sought, one of them.
+/// All others are taken as straight: what they add to the next state is normal.
+struct ScorePlan {
+  std::vector<std::size_t> lattice;
+  std::optional<std::size_t> failing;
+};
+
+/// Finds out where the map bends by more than one part in a thousand of its slope, at every measured row, and whether
+/// it fails within four and a half sds of its scores or did fail.
+/// @throws std::invalid_argument where the map returns no finite state from a measured row
+ScorePlan score_plan(const Machine& machine, const MachineRuns& runs, const MachineHypothesis& nominal);
+
+}  // namespace metastable::analysis

@@ -1,0 +1,155 @@
+// The likelihood of a machine's trials, against closed forms.
+
+#include "analysis/machine_model/machine_filter.h"
+
+#include <gtest/gtest.h>
+
+#include <Eigen/Dense>
+#include <algorithm>
+#include <cmath>
+#include <vector>
+
+#include "dynamics/numerics/truncated_normal.h"
+#include "tests/analysis/machine_model/machines.h"
+
+namespace metastable::analysis::test {
+namespace {
+
+MachineHypothesis nominal_of(const Machine& machine) {
+  MachineHypothesis h;
+  for (const MachineParameter& p : machine.parameters) h.values.push_back(p.nominal);
+  for (const MachineEffect& effect : machine.effects)
+    for (const SuspectedParameter& p : effect.parameters) h.values.push_back(p.neutral);
+  for (const MachineSensor& sensor : machine.observe) h.sensor_sd.push_back(sensor.sd.value_or(0));
+  return h;
+}
+
+Evaluation followed(const Machine& machine, const MachineRuns& runs, const MachineHypothesis& h) {
+  const ScorePlan plan = score_plan(machine, runs, h);
+  return follow_machine(machine, runs, plan, machine_events(machine, runs, plan), h);
+}
+
+// The log density of the seen rows after the first, given the first, by the covariance of all rows together: the first
+// state is that seen less its error, with nothing known of it before.
+double exact_log_density(const MachineTrial& trial, double a, double b, double s, double error, double correlation) {
+  const auto n = static_cast<Eigen::Index>(trial.rows.size());
+  // Rows as a linear function of (e_0, e_1, ..., z_1, ...): x_0 = y_0 - e_0.
+  Eigen::MatrixXd from = Eigen::MatrixXd::Zero(n, 2 * n), noise = Eigen::MatrixXd::Identity(2 * n, 2 * n);
+  Eigen::VectorXd mean = Eigen::VectorXd::Zero(n);
+  Eigen::VectorXd x = Eigen::VectorXd::Zero(2 * n);
+  x[0] = -1;
+  double middle = trial.rows[0].seen[0];
+  for (Eigen::Index k = 1; k < n; ++k) {
+    x *= a;
+    x[n + k] = s;
+    middle = a * middle + b;
+    from.row(k) = x;
+    from(k, k) += 1;
+    mean[k] = middle;
+  }
+  for (Eigen::Index k = 0; k < n; ++k) {
+    noise(k, k) = error * error;
+    if (k > 0) noise(k, k - 1) = noise(k - 1, k) = correlation * error * error;
+  }
+  std::vector<Eigen::Index> seen;
+  for (Eigen::Index k = 1; k < n; ++k)
+    if (!std::isnan(trial.rows[static_cast<std::size_t>(k)].seen[0])) seen.push_back(k);
+  const auto m = static_cast<Eigen::Index>(seen.size());
+  const Eigen::MatrixXd all = from * noise * from.transpose();
+  Eigen::MatrixXd covariance(m, m);
+  Eigen::VectorXd off(m);
+  for (Eigen::Index i = 0; i < m; ++i) {
+    off[i] = trial.rows[static_cast<std::size_t>(seen[static_cast<std::size_t>(i)])].seen[0] -
+             mean[seen[static_cast<std::size_t>(i)]];
+    for (Eigen::Index j = 0; j < m; ++j)
+      covariance(i, j) = all(seen[static_cast<std::size_t>(i)], seen[static_cast<std::size_t>(j)]);
+  }
+  const Eigen::LLT<Eigen::MatrixXd> root(covariance);
+  const Eigen::VectorXd white = root.matrixL().solve(off);
+  return -0.5 * white.squaredNorm() - root.matrixL().toDenseMatrix().diagonal().array().log().sum() -
+         0.5 * static_cast<double>(m) * std::log(2 * std::numbers::pi);
+}
+
+TEST(MachineFilter, IsTheExactLikelihoodOfALinearMachine) {
+  for (const double correlation : {0.0, -0.5, 0.3}) {
+    const Machine machine = linear_machine(0.1, correlation);
+    MachineRuns runs =
+        scalar_runs(5, 12, 1.0, 0.1, 3, [](double x, double z, std::size_t) { return 0.8 * x + 0.3 + 0.2 * z; });
+    runs.trials[1].rows[4].seen[0] = runs.trials[1].rows[5].seen[0] = runs.trials[2].rows[11].seen[0] = missing;
+    runs.trials[3].rows.resize(7);
+    double exact = 0;
+    for (const MachineTrial& trial : runs.trials) exact += exact_log_density(trial, 0.8, 0.3, 0.2, 0.1, correlation);
+    EXPECT_NEAR(followed(machine, runs, nominal_of(machine)).total(), exact, 1e-9 * std::abs(exact)) << correlation;
+  }
+}
+
+// Distance of scores from the standard normal, times the root of their number.
+double kolmogorov(std::vector<double> scores) {
+  std::ranges::sort(scores);
+  const auto n = static_cast<double>(scores.size());
+  double most = 0;
+  for (std::size_t i = 0; i < scores.size(); ++i) {
+    const double p = dynamics::normal_cdf(scores[i]);
+    most = std::max({most, std::abs(p - static_cast<double>(i) / n), std::abs(p - static_cast<double>(i + 1) / n)});
+  }
+  return most * std::sqrt(n);
+}
+
+Machine skewed_machine(double error) {
+  Machine machine = linear_machine(error);
+  machine.parameters = {{"a", 0.5, 0.05}};
+  machine.effects.clear();
+  machine.may_vary.clear();
+  machine.step = [](const MachineBatch& batch) {
+    for (std::size_t i = 0; i < batch.rows; ++i)
+      batch.next[i] = batch.values[0][0] * batch.states[i] + std::exp(batch.scores[i] / 2);
+  };
+  return machine;
+}
+
+TEST(MachineFilter, ScoresOfASkewedLandingAreNormal) {
+  for (const double error : {0.0, 0.05, 0.5}) {
+    const Machine machine = skewed_machine(error);
+    const MachineRuns runs = scalar_runs(
+        200, 101, 2.0, error, 7, [](double x, double z, std::size_t) { return x / 2 + std::exp(z / 2); });
+    const Evaluation evaluation = followed(machine, runs, nominal_of(machine));
+    ASSERT_EQ(evaluation.score.size(), 20000u);
+    EXPECT_LT(kolmogorov(evaluation.score), 1.63) << error;  // 1 % of normal samples exceed it
+  }
+}
+
+// A machine that fails below an edge: x' = x / 2 + 1 + z / 2 where z > edge.
+TEST(MachineFilter, FailureHasTheProbabilityOfTheScoresThatFail) {
+  Machine machine = linear_machine(0.05);
+  machine.parameters = {{"edge", -1.5, 0.1}};
+  machine.effects.clear();
+  machine.may_vary.clear();
+  machine.step = [](const MachineBatch& batch) {
+    for (std::size_t i = 0; i < batch.rows; ++i) {
+      batch.next[i] = batch.states[i] / 2 + 1 + batch.scores[i] / 2;
+      batch.failed[i] = batch.scores[i] < batch.values[0][0];
+    }
+  };
+  MachineRuns runs = scalar_runs(20, 10, 2.0, 0.05, 11, [](double x, double z, std::size_t) {
+    return x / 2 + 1 + std::abs(z) / 2;
+  });
+  for (std::size_t t = 0; t < 4; ++t) runs.trials[t].outcome = MachineOutcome::failed;
+  const MachineHypothesis h = nominal_of(machine);
+  const ScorePlan plan = score_plan(machine, runs, h);
+  ASSERT_TRUE(plan.failing);
+  const std::vector<Event> events = machine_events(machine, runs, plan);
+  std::vector<double> chances;
+  const Evaluation evaluation = follow_machine(machine, runs, plan, events, h, &chances);
+  const double chance = dynamics::normal_cdf(-1.5);
+  int failed = 0;
+  for (std::size_t e = 0; e < events.size(); ++e) {
+    EXPECT_NEAR(chances[e], chance, 1e-7);
+    if (events[e].kind != EventKind::rest) continue;
+    ++failed;
+    EXPECT_NEAR(evaluation.log_density[e], std::log(chance), 1e-6);
+  }
+  EXPECT_EQ(failed, 4);
+}
+
+}  // namespace
+}  // namespace metastable::analysis::test
