@@ -11,6 +11,7 @@
 #include <utility>
 #include <vector>
 
+#include "analysis/diagnosis/diagnosis.h"
 #include "reports/output/table.h"
 #include "reports/python/call.h"
 #include "reports/study/study_progress.h"
@@ -54,6 +55,9 @@ inline std::string tables_html(const std::vector<Table>& tables) {
   return html;
 }
 
+/// Gives a diagnosis as `diagnose --json` and its text.
+py::dict diagnosis_answer(const analysis::Diagnosis& found, const Provenance& provenance);
+
 /// Tells a call of the parts of a command.
 inline BeginPart parts_of(Call& call) {
   return [&call](const std::string& name) {
@@ -65,6 +69,7 @@ inline BeginPart parts_of(Call& call) {
 void add_blind(py::module_& module);
 void add_studies(py::module_& module);
 void add_experiments(py::module_& module);
+void add_machines(py::module_& module);
 void add_maps(py::module_& module);
 void add_chains(py::module_& module);
 

@@ -184,11 +184,7 @@ py::dict diagnose(const HeldExperiment& held, const py::dict& options, const std
   study.progress = [&](double share, const std::string& doing) { call.tell(share, doing); };
   call.run([&] { found = analysis::diagnose(held->experiment, study); });
   const Provenance provenance{command, "experiment: " + held->experiment.title, study.seed, version()};
-  std::vector<Table> tables{gap_table(found),    contact_table(found),   where_table(found), at_work_table(found),
-                            causes_table(found), shrinkage_table(found), steps_table(found), visibility_table(found)};
-  std::erase_if(tables, [](const Table& table) { return table.rows.empty(); });
-  return answer(diagnosis_json(found, provenance), diagnosis_text(found, line_width),
-                "<p>" + escape_html(fmt::format("{}", fmt::join(found.sentences, " "))) + "</p>" + tables_html(tables));
+  return diagnosis_answer(found, provenance);
 }
 
 py::dict describe(const HeldExperiment& held, const py::dict& options, const std::string& command,
@@ -214,6 +210,14 @@ py::dict describe(const HeldExperiment& held, const py::dict& options, const std
 }
 
 }  // namespace
+
+py::dict diagnosis_answer(const analysis::Diagnosis& found, const Provenance& provenance) {
+  std::vector<Table> tables{gap_table(found),    contact_table(found),   where_table(found), at_work_table(found),
+                            causes_table(found), shrinkage_table(found), steps_table(found), visibility_table(found)};
+  std::erase_if(tables, [](const Table& table) { return table.rows.empty(); });
+  return answer(diagnosis_json(found, provenance), diagnosis_text(found, line_width),
+                "<p>" + escape_html(fmt::format("{}", fmt::join(found.sentences, " "))) + "</p>" + tables_html(tables));
+}
 
 void add_experiments(py::module_& module) {
   py::class_<Held, HeldExperiment>(module, "Experiment")

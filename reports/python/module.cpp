@@ -90,6 +90,7 @@ PYBIND11_MODULE(_metastable, module) {
   python::add_blind(module);
   python::add_studies(module);
   python::add_experiments(module);
+  python::add_machines(module);
   python::add_maps(module);
   python::add_chains(module);
 }

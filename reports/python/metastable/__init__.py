@@ -25,6 +25,7 @@ import numpy
 
 from metastable import _frames, _metastable, _progress, blind
 from metastable._errors import ComputationError, Contradiction, InputError, MapError
+from metastable._machines import Machine, Runs, machine, runs
 from metastable._results import (Columns, Comparison, Description, Diagnosis, HowItFails, Record, Regime, Result, Solution,
                                  Study, Sweep, Table, WalkerComparison, WalkerStudy, Walks)
 
@@ -32,9 +33,9 @@ __version__ = _metastable.version
 
 __all__ = [
     "Chain", "Columns", "Comparison", "ComputationError", "Contradiction", "Description", "Diagnosis", "Experiment",
-    "FirstPassage", "HowItFails", "InputError", "MapError", "Passage", "QuasiStationary", "Record", "Regime", "Result", "Setting",
+    "FirstPassage", "HowItFails", "InputError", "Machine", "MapError", "Passage", "QuasiStationary", "Record", "Regime", "Result", "Runs", "Setting",
     "SimulatedSteps", "Solution", "Study", "Sweep", "Table", "Walker", "WalkerComparison", "WalkerSetting", "WalkerStudy", "Walks",
-    "blind", "chain", "compare", "describe", "diagnose", "effects", "experiment", "read_experiment", "simulate",
+    "blind", "chain", "compare", "describe", "diagnose", "effects", "experiment", "machine", "read_experiment", "runs", "simulate",
     "solve", "study", "sweep", "version_text", "walker",
 ]
 
@@ -538,17 +539,26 @@ def _experiment(what):
     return what._held if isinstance(what, Experiment) else _metastable.read_experiment(os.fspath(what))
 
 
-def diagnose(experiment, *, catalogue=(), at_slope=None, at_speed=None, seed=1, threads=0, progress=None):
+def diagnose(experiment, machine=None, *, catalogue=(), at_slope=None, at_speed=None, seed=1, threads=0, progress=None):
     """What the nominal model of an experiment lacks: is there a gap, where, which effect causes it, how far it shrinks.
 
-    experiment  an Experiment, or the path of an experiment folder
+    experiment  an Experiment, or the path of an experiment folder; or Runs of a machine of your own
+    machine     that the runs are of: a Machine
     catalogue   effects to consider, ids of effects(); a pair "a+b" is tried in any case; none: all
     at_slope    [deg] the machine's expected steps on another slope, too
     at_speed    [rad/s] the same for another launch, omega just before the first collision
     """
     options = dict(catalogue=[catalogue] if isinstance(catalogue, str) else list(catalogue), seed=seed, threads=threads)
     options.update({key: value for key, value in (("at_slope", at_slope), ("at_speed", at_speed)) if value is not None})
-    command = _called("diagnose", experiment, catalogue=options["catalogue"] or None, seed=seed)
+    command = _called("diagnose", experiment, *([] if machine is None else [machine]),
+                      catalogue=options["catalogue"] or None, seed=seed)
+    if isinstance(experiment, Runs) or machine is not None:
+        if not isinstance(experiment, Runs) or not isinstance(machine, Machine):
+            raise TypeError("diagnose: runs of a machine are given with it: diagnose(runs, machine)")
+        if at_slope is not None or at_speed is not None:
+            raise InputError("at_slope, at_speed: have no meaning with a machine of your own")
+        with _progress.telling(progress, "diagnose") as tell:
+            return Diagnosis(_metastable.diagnose_machine(machine._fields(), experiment._laid_out, options, command, tell))
     with _progress.telling(progress, "diagnose") as tell:
         return Diagnosis(_metastable.diagnose(_experiment(experiment), options, command, tell))
 

@@ -1,0 +1,63 @@
+#include "reports/python/step_arrays.h"
+
+#include <fmt/format.h>
+
+#include <cstring>
+#include <string>
+
+namespace metastable::reports::python {
+namespace {
+
+std::string shape_of(const py::array& array) { return py::str(array.attr("shape")).cast<std::string>(); }
+
+[[noreturn]] void refuse(const std::string& what) { throw py::type_error("step: " + what); }
+
+// Copies what `step` returned for the next states.
+void take_next(const py::object& returned, std::size_t rows, std::span<double> next) {
+  const py::array array = py::array::ensure(returned);
+  if (!array || std::strchr("fiu", array.dtype().kind()) == nullptr)
+    refuse(fmt::format("the next states are no array of real numbers, but {}",
+                       array ? "of dtype " + py::str(array.dtype()).cast<std::string>()
+                             : std::string(py::str(py::type::of(returned).attr("__name__")))));
+  const std::size_t dimension = next.size() / rows;
+  const bool flat = dimension == 1 && array.ndim() == 1 && static_cast<std::size_t>(array.shape(0)) == rows;
+  const bool full = array.ndim() == 2 && static_cast<std::size_t>(array.shape(0)) == rows &&
+                    static_cast<std::size_t>(array.shape(1)) == dimension;
+  if (!flat && !full)
+    throw py::value_error(
+        fmt::format("step: next states of shape {}, ({}, {}) expected", shape_of(array), rows, dimension));
+  const py::array_t<double, py::array::c_style | py::array::forcecast> numbers(array);
+  std::memcpy(next.data(), numbers.data(), next.size_bytes());
+}
+
+void take_failed(const py::object& returned, std::span<std::uint8_t> failed) {
+  const py::array array = py::array::ensure(returned);
+  if (!array || array.dtype().kind() != 'b')
+    refuse(fmt::format("whether each state failed is no array of booleans, but {}",
+                       array ? "of dtype " + py::str(array.dtype()).cast<std::string>()
+                             : std::string(py::str(py::type::of(returned).attr("__name__")))));
+  if (array.ndim() != 1 || static_cast<std::size_t>(array.shape(0)) != failed.size())
+    throw py::value_error(fmt::format("step: failed of shape {}, ({},) expected", shape_of(array), failed.size()));
+  const py::array_t<bool, py::array::c_style | py::array::forcecast> flags(array);
+  for (std::size_t i = 0; i < failed.size(); ++i) failed[i] = flags.data()[i] ? 1 : 0;
+}
+
+}  // namespace
+
+py::array_t<double> rows_of(std::span<const double> values, std::size_t rows) {
+  py::array_t<double> array({rows, values.size() / rows});
+  std::memcpy(array.mutable_data(), values.data(), values.size_bytes());
+  array.attr("setflags")(py::arg("write") = false);
+  return array;
+}
+
+void take_step(const py::object& returned, std::size_t rows, std::span<double> next, std::span<std::uint8_t> failed) {
+  if (!py::isinstance<py::tuple>(returned) || py::len(returned) != 2)
+    refuse(fmt::format("(next states, failed) is to be returned, not {}",
+                       std::string(py::str(py::type::of(returned).attr("__name__")))));
+  const auto both = returned.cast<py::tuple>();
+  take_next(both[0], rows, next);
+  take_failed(both[1], failed);
+}
+
+}  // namespace metastable::reports::python

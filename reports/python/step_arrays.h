@@ -1,0 +1,21 @@
+#pragma once
+// Gives a simulator written in Python its arrays, and takes what it returns.
+
+#include <pybind11/numpy.h>
+#include <pybind11/pybind11.h>
+
+#include <cstdint>
+#include <span>
+
+namespace metastable::reports::python {
+
+namespace py = pybind11;
+
+/// Returns numbers of one kind in rows; Python may keep them, and may not write into them.
+py::array_t<double> rows_of(std::span<const double> values, std::size_t rows);
+
+/// Copies what a step returned: (next states [rows x dimension], failed [rows]).
+/// @throws py::type_error or py::value_error saying what it returned instead
+void take_step(const py::object& returned, std::size_t rows, std::span<double> next, std::span<std::uint8_t> failed);
+
+}  // namespace metastable::reports::python
