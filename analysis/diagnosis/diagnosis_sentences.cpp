@@ -287,7 +287,7 @@ std::string next_step(const Diagnosis& d) {
       return "Use the model as it is. An effect below its smallest size under “What these data could have seen” would "
              "have gone unnoticed; more trials lower these sizes.";
     case Verdict::recalibrate:
-      return "Put the recalibrated parameters into experiment.toml and diagnose trials that were not used here: if "
+      return "Give the model the recalibrated parameters and diagnose trials that were not used here: if "
              "these ask for other ones again, something drifts.";
     case Verdict::explained:
       if (d.causes.set.size() == 1)

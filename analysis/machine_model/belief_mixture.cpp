@@ -31,38 +31,43 @@ double score_of(double below, double above) {
 
 }  // namespace
 
-double BeliefMixture::log_mass() const {
+template <int Most>
+double BeliefMixture<Most>::log_mass() const {
   std::vector<double> logs;
   for (const Part& part : parts_) logs.push_back(part.log_weight);
   return log_sum(logs);
 }
 
 // Adds the mixture as one normal; the other parts give way to it.
-BeliefMixture::Part& BeliefMixture::give_way(double share) {
+template <int Most>
+typename BeliefMixture<Most>::Part& BeliefMixture<Most>::give_way(double share) {
   Part one = collapsed();
   one.log_weight = log_mass() + std::log(share);
   for (Part& part : parts_) part.log_weight += std::log1p(-share);
   return parts_.emplace_back(std::move(one));
 }
 
-void BeliefMixture::add_wild(double share, double width) {
+template <int Most>
+void BeliefMixture<Most>::add_wild(double share, double width) {
   if (share > 0 && !parts_.empty()) give_way(share).width = width;
 }
 
-void BeliefMixture::add_outlier(double share, double width, Eigen::Index states) {
+template <int Most>
+void BeliefMixture<Most>::add_outlier(double share, double width, Eigen::Index states) {
   if (!(share > 0) || parts_.empty()) return;
-  Eigen::MatrixXd& covariance = give_way(share).covariance;
+  BeliefMatrix<Most>& covariance = give_way(share).covariance;
   covariance.topRows(states) *= width;
   covariance.leftCols(states) *= width;
 }
 
-SeenValue BeliefMixture::see(const Look& look, double value, double failed) {
+template <int Most>
+SeenValue BeliefMixture<Most>::see(const Look<Most>& look, double value, double failed) {
   std::vector<double> logs;
   logs.reserve(parts_.size());
   const double mass = log_mass();
   double below = failed, above = 0, lone = 0;
   for (Part& part : parts_) {
-    const Eigen::VectorXd gain = part.covariance * look.weights;
+    const BeliefVector<Most> gain = part.covariance * look.weights;
     double variance = look.weights.dot(gain) + look.variance;
     variance *= part.width * part.width;
     const double off = value - look.offset - look.weights.dot(part.mean);
@@ -93,16 +98,20 @@ SeenValue BeliefMixture::see(const Look& look, double value, double failed) {
   return seen;
 }
 
-BeliefMixture::Part BeliefMixture::collapsed() const {
+template <int Most>
+typename BeliefMixture<Most>::Part BeliefMixture<Most>::collapsed() const {
   const double mass = log_mass();
-  Part one{0, Eigen::VectorXd::Zero(parts_.front().mean.size()), {}, 1};
+  Part one{0, BeliefVector<Most>::Zero(parts_.front().mean.size()), {}, 1};
   for (const Part& part : parts_) one.mean += std::exp(part.log_weight - mass) * part.mean;
-  one.covariance = Eigen::MatrixXd::Zero(one.mean.size(), one.mean.size());
+  one.covariance = BeliefMatrix<Most>::Zero(one.mean.size(), one.mean.size());
   for (const Part& part : parts_) {
-    const Eigen::VectorXd off = part.mean - one.mean;
+    const BeliefVector<Most> off = part.mean - one.mean;
     one.covariance += std::exp(part.log_weight - mass) * (part.covariance + off * off.transpose());
   }
   return one;
 }
+
+template class BeliefMixture<small_belief>;
+template class BeliefMixture<Eigen::Dynamic>;
 
 }  // namespace metastable::analysis

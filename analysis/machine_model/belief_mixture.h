@@ -6,9 +6,19 @@
 
 namespace metastable::analysis {
 
+/// Vectors and matrices of at most `Most` rows, which need no memory of their own; Eigen::Dynamic: of any size.
+template <int Most>
+using BeliefVector = Eigen::Matrix<double, Eigen::Dynamic, 1, 0, Most, 1>;
+template <int Most>
+using BeliefMatrix = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, 0, Most, Most>;
+
+/// The size up to which beliefs need no memory of their own.
+inline constexpr int small_belief = 8;
+
 /// What a measured value is of: weights over the state, and the variance of its error.
+template <int Most>
 struct Look {
-  Eigen::VectorXd weights;
+  BeliefVector<Most> weights;
   double offset = 0;  ///< what is seen is so much more
   double variance = 0;
 };
@@ -21,12 +31,13 @@ struct SeenValue {
 };
 
 /// Holds normals with weights that add up to the probability that the machine goes on.
+template <int Most>
 class BeliefMixture {
  public:
   struct Part {
     double log_weight = 0;
-    Eigen::VectorXd mean;
-    Eigen::MatrixXd covariance;
+    BeliefVector<Most> mean;
+    BeliefMatrix<Most> covariance;
     double width = 1;  ///< above 1: a value is seen so many times as far off, and tells nothing of this part
   };
 
@@ -38,7 +49,7 @@ class BeliefMixture {
   void add_wild(double share, double width);
   /// Sharpens the belief by a value; weights then add up to 1.
   /// @param failed  probability that the machine failed instead: it counts as a value below all
-  SeenValue see(const Look& look, double value, double failed);
+  SeenValue see(const Look<Most>& look, double value, double failed);
   /// Returns the one normal with the mixture's mean and covariance.
   Part collapsed() const;
 

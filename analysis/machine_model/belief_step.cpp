@@ -11,14 +11,16 @@ namespace {
 constexpr double reach = 1.7320508075688772;  // points at sqrt 3 sds have the normal's fourth moment
 constexpr double bend_share = 1.0 / 18;       // (h^2 - 1) / (4 h^4) with h^2 = 3
 constexpr double rounding = 1e-14;            // of a variance
-constexpr int halvings = 30;                  // of a lattice's cell, to the edge of failure
+constexpr int halvings = 22;                  // of a lattice's cell, to the edge of failure
+constexpr double almost_sure = 1 - 1e-12;     // a chance of failure
 constexpr double least_weight = 1e-10;        // of a cell that counts
 constexpr double infinite = std::numeric_limits<double>::infinity();
 
 // Returns the lower root L of L L^T = covariance, with zero columns where there is no variance of its own.
-Eigen::MatrixXd root_of(const Eigen::MatrixXd& covariance) {
+template <class Matrix>
+Matrix root_of(const Matrix& covariance) {
   const Eigen::Index n = covariance.rows();
-  Eigen::MatrixXd root = Eigen::MatrixXd::Zero(n, n);
+  Matrix root = Matrix::Zero(n, n);
   for (Eigen::Index j = 0; j < n; ++j) {
     const double pivot = covariance(j, j) - root.row(j).head(j).squaredNorm();
     if (!(pivot > rounding * covariance(j, j))) continue;
@@ -32,20 +34,23 @@ Eigen::MatrixXd root_of(const Eigen::MatrixXd& covariance) {
 }  // namespace
 
 // First and second differences of the next state, in one trial.
-struct BeliefStep::Slopes {
-  Eigen::VectorXd centre;                 // next state of the mean, scores at zero
-  Eigen::MatrixXd first, bend;            // [states x (used columns, straight scores)]: slope, f+ - 2 f0 + f-
-  std::vector<Eigen::MatrixXd> by_score;  // by lattice score: change of `first` a unit of it
+template <int Most>
+struct BeliefStep<Most>::Slopes {
+  Vector centre;                 // next state of the mean, scores at zero
+  Matrix first, bend;            // [states x (used columns, straight scores)]: slope, f+ - 2 f0 + f-
+  std::vector<Matrix> by_score;  // by lattice score: change of `first` a unit of it
 };
 
 // One cell of the lattice, in one trial.
-struct BeliefStep::Cell {
+template <int Most>
+struct BeliefStep<Most>::Cell {
   double weight = 0, dead = 0;     // of the part that goes on, and of the one that fails
   std::size_t anchor = 0;          // the point of the lattice from which its next state is taken
   std::vector<CellPart> by_score;  // mean and variance, by lattice score
 };
 
-BeliefStep::BeliefStep(MachineStepper& stepper, const ScorePlan& plan, std::size_t shared)
+template <int Most>
+BeliefStep<Most>::BeliefStep(MachineStepper& stepper, const ScorePlan& plan, std::size_t shared)
     : stepper_(stepper), plan_(plan), shared_(shared) {
   if (!plan_.lattice.empty()) axis_ = lattice_axis(static_cast<int>(plan_.lattice.size()));
   if (plan_.failing && plan_.lattice.front() != *plan_.failing) std::swap(plan_.lattice.front(), plan_.lattice.back());
@@ -53,15 +58,17 @@ BeliefStep::BeliefStep(MachineStepper& stepper, const ScorePlan& plan, std::size
     if (std::ranges::find(plan_.lattice, m) == plan_.lattice.end()) straight_.push_back(m);
 }
 
-std::size_t BeliefStep::lattice_points() const {
+template <int Most>
+std::size_t BeliefStep<Most>::lattice_points() const {
   std::size_t count = plan_.lattice.empty() ? 0 : 1;
   for (std::size_t b = 0; b < plan_.lattice.size(); ++b) count *= axis_.points.size();
   return count;
 }
 
 // The first score of the lattice runs fastest.
-Eigen::VectorXd BeliefStep::lattice_scores(std::size_t point) const {
-  Eigen::VectorXd fresh = Eigen::VectorXd::Zero(static_cast<Eigen::Index>(stepper_.scores()));
+template <int Most>
+BeliefVector<Most> BeliefStep<Most>::lattice_scores(std::size_t point) const {
+  Vector fresh = Vector::Zero(static_cast<Eigen::Index>(stepper_.scores()));
   for (const std::size_t score : plan_.lattice) {
     fresh[static_cast<Eigen::Index>(score)] = axis_.points[point % axis_.points.size()];
     point /= axis_.points.size();
@@ -70,15 +77,15 @@ Eigen::VectorXd BeliefStep::lattice_scores(std::size_t point) const {
 }
 
 // The centre, pairs along the root and the straight scores, the lattice, and pairs at both ends of each of its scores.
-void BeliefStep::add_points(const TransitionPlace& place, const BeliefMixture::Part& belief,
-                            const Eigen::MatrixXd& root) {
-  const Eigen::VectorXd mean = belief.mean.head(size());
-  const Eigen::VectorXd still = Eigen::VectorXd::Zero(static_cast<Eigen::Index>(stepper_.scores()));
+template <int Most>
+void BeliefStep<Most>::add_points(const TransitionPlace& place, const Part& belief, const Matrix& root) {
+  const Vector mean = belief.mean.head(size());
+  const Vector still = Vector::Zero(static_cast<Eigen::Index>(stepper_.scores()));
   const auto unit = [&](std::size_t score) {
-    return Eigen::VectorXd(Eigen::VectorXd::Unit(still.size(), static_cast<Eigen::Index>(score)));
+    return Vector(Vector::Unit(still.size(), static_cast<Eigen::Index>(score)));
   };
   stepper_.add(place, mean, still);
-  const auto add_pairs = [&](const Eigen::VectorXd& fresh) {
+  const auto add_pairs = [&](const Vector& fresh) {
     for (const Eigen::Index i : used_)
       for (const double sign : {reach, -reach}) stepper_.add(place, mean + sign * root.col(i).head(size()), fresh);
     for (const std::size_t s : straight_)
@@ -91,13 +98,13 @@ void BeliefStep::add_points(const TransitionPlace& place, const BeliefMixture::P
 }
 
 // Where one of a pair failed, the slope is that of the other side.
-Eigen::MatrixXd BeliefStep::first_differences(std::size_t at, const Eigen::VectorXd* centre,
-                                              Eigen::MatrixXd* bend) const {
-  Eigen::MatrixXd slope = Eigen::MatrixXd::Zero(states(), static_cast<Eigen::Index>(pairs()));
+template <int Most>
+BeliefMatrix<Most> BeliefStep<Most>::first_differences(std::size_t at, const Vector* centre, Matrix* bend) const {
+  Matrix slope = Matrix::Zero(states(), static_cast<Eigen::Index>(pairs()));
   if (bend) *bend = slope;
   for (std::size_t i = 0; i < pairs(); ++i) {
     const bool lost_up = stepper_.failed(at + 2 * i), lost_down = stepper_.failed(at + 2 * i + 1);
-    const Eigen::VectorXd up = stepper_.next(at + 2 * i), down = stepper_.next(at + 2 * i + 1);
+    const Vector up = stepper_.next(at + 2 * i), down = stepper_.next(at + 2 * i + 1);
     const auto column = static_cast<Eigen::Index>(i);
     if (!lost_up && !lost_down) {
       slope.col(column) = (up - down) / (2 * reach);
@@ -109,7 +116,8 @@ Eigen::MatrixXd BeliefStep::first_differences(std::size_t at, const Eigen::Vecto
   return slope;
 }
 
-BeliefStep::Slopes BeliefStep::slopes(std::size_t trial) const {
+template <int Most>
+typename BeliefStep<Most>::Slopes BeliefStep<Most>::slopes(std::size_t trial) const {
   const std::size_t first = trial * points_;
   Slopes s;
   s.centre = stepper_.next(first);
@@ -124,11 +132,12 @@ BeliefStep::Slopes BeliefStep::slopes(std::size_t trial) const {
 
 // Columns whose outer product is the covariance after the step: of the belief's root, of the straight scores, and of
 // this row's own errors.
-Eigen::MatrixXd BeliefStep::columns(const Eigen::MatrixXd& slope, const Eigen::MatrixXd& root) const {
+template <int Most>
+BeliefMatrix<Most> BeliefStep<Most>::columns(const Matrix& slope, const Matrix& root) const {
   const auto shared = static_cast<Eigen::Index>(shared_), offsets = static_cast<Eigen::Index>(stepper_.offsets());
   const Eigen::Index before = states() + offsets, old = root.cols(),
                      scores = static_cast<Eigen::Index>(straight_.size());
-  Eigen::MatrixXd all = Eigen::MatrixXd::Zero(size() + 2 * shared, old + scores + shared);
+  Matrix all = Matrix::Zero(size() + 2 * shared, old + scores + shared);
   for (std::size_t i = 0; i < used_.size(); ++i)
     all.col(used_[i]).head(states()) = slope.col(static_cast<Eigen::Index>(i));
   all.block(states(), 0, offsets, old) = root.block(states(), 0, offsets, old);
@@ -146,12 +155,13 @@ Eigen::MatrixXd BeliefStep::columns(const Eigen::MatrixXd& slope, const Eigen::M
 }
 
 // The step of a normal belief with the scores of the lattice at zero.
-BeliefMixture::Part BeliefStep::part(const Slopes& slopes, const BeliefMixture::Part& belief,
-                                     const Eigen::MatrixXd& root) const {
+template <int Most>
+typename BeliefStep<Most>::Part BeliefStep<Most>::part(const Slopes& slopes, const Part& belief,
+                                                       const Matrix& root) const {
   const auto shared = static_cast<Eigen::Index>(shared_), offsets = static_cast<Eigen::Index>(stepper_.offsets());
-  const Eigen::MatrixXd all = columns(slopes.first, root);
-  BeliefMixture::Part out;
-  out.mean = Eigen::VectorXd::Zero(all.rows());
+  const Matrix all = columns(slopes.first, root);
+  Part out;
+  out.mean = Vector::Zero(all.rows());
   out.mean.head(states()) = slopes.centre + slopes.bend.rowwise().sum() / (2 * reach * reach);
   out.mean.segment(states(), offsets) = belief.mean.segment(states(), offsets);
   for (Eigen::Index m = states() + offsets; m < size(); ++m)
@@ -162,7 +172,8 @@ BeliefMixture::Part BeliefStep::part(const Slopes& slopes, const BeliefMixture::
   return out;
 }
 
-std::vector<BeliefStep::Interval> BeliefStep::Line::alive() const {
+template <int Most>
+std::vector<typename BeliefStep<Most>::Interval> BeliefStep<Most>::Line::alive() const {
   std::vector<Interval> all;
   bool on = begins_alive;
   double from = -infinite;
@@ -175,46 +186,90 @@ std::vector<BeliefStep::Interval> BeliefStep::Line::alive() const {
   return all;
 }
 
-// Lines along the failing score, with the edges of failure found by halving, those of all trials together. The points
-// that were stepped are needed later on: the halving steps in a stepper of its own.
-std::vector<BeliefStep::Line> BeliefStep::lines(std::span<const TransitionPlace> places,
-                                                std::span<const BeliefMixture::Part> beliefs) {
-  struct Edge {
-    std::size_t line;
-    double low, high;
-    bool low_alive;
-  };
+// Where going on and failing meet, between two scores of a line.
+template <int Most>
+struct BeliefStep<Most>::Edge {
+  std::size_t line;
+  double low, high;
+  bool low_alive;
+};
+
+// Lines along the failing score, trial by trial: first those from the mean, then those from states about it, by which
+// the chance of failure knows that the state is not known exactly.
+template <int Most>
+std::vector<typename BeliefStep<Most>::Line> BeliefStep<Most>::lines(std::span<const TransitionPlace> places,
+                                                                     std::span<const Part> beliefs,
+                                                                     std::span<const Matrix> roots) const {
+  const auto columns = static_cast<double>(used_.size());
+  const double spread = std::max(3.0, columns);  // points at the root of it have the normal's second moment
   std::vector<Line> all;
-  std::vector<Edge> edges;
-  const std::size_t n = axis_.points.size();
-  for (std::size_t t = 0; t < places.size(); ++t)
-    for (std::size_t p = 0; p < lattice_points(); p += n) {
-      const std::size_t first = lattice_start(t) + p;
-      all.push_back({t, p, !stepper_.failed(first)});
-      for (std::size_t i = 0; i + 1 < n; ++i)
-        if (stepper_.failed(first + i) != stepper_.failed(first + i + 1))
-          edges.push_back({all.size() - 1, axis_.points[i], axis_.points[i + 1], !stepper_.failed(first + i)});
-    }
-  if (edges.empty()) return all;
-  MachineStepper halving = stepper_;
-  for (int round = 0; round < halvings; ++round) {
-    halving.clear();
-    for (const Edge& edge : edges) {
-      Eigen::VectorXd fresh = lattice_scores(all[edge.line].first);
-      fresh[static_cast<Eigen::Index>(*plan_.failing)] = 0.5 * (edge.low + edge.high);
-      const std::size_t t = all[edge.line].trial;
-      halving.add(places[t], beliefs[t].mean.head(size()), fresh);
-    }
-    halving.run();
-    for (std::size_t e = 0; e < edges.size(); ++e)
-      (halving.failed(e) != edges[e].low_alive ? edges[e].low : edges[e].high) = 0.5 * (edges[e].low + edges[e].high);
+  for (std::size_t t = 0; t < places.size(); ++t) {
+    const Vector mean = beliefs[t].mean.head(size());
+    const auto add = [&](double weight, const Vector& from) {
+      for (std::size_t p = 0; p < lattice_points(); p += axis_.points.size()) all.push_back({t, p, weight, from});
+    };
+    add(1 - columns / spread, mean);
+    for (const Eigen::Index i : used_)
+      for (const double sign : {1.0, -1.0})
+        add(0.5 / spread, mean + sign * std::sqrt(spread) * roots[t].col(i).head(size()));
   }
-  for (const Edge& edge : edges) all[edge.line].edges.push_back(0.5 * (edge.low + edge.high));
+  find_edges(all, places);
   return all;
 }
 
+// Steps all lines and halves the edges of failure on them, all together. The points that were stepped before are needed
+// later on: this is a stepper of its own.
+template <int Most>
+void BeliefStep<Most>::find_edges(std::vector<Line>& lines, std::span<const TransitionPlace> places) const {
+  const std::size_t n = axis_.points.size();
+  MachineStepper stepper = stepper_;
+  stepper.clear();
+  for (const Line& line : lines)
+    for (std::size_t i = 0; i < n; ++i) stepper.add(places[line.trial], line.from, lattice_scores(line.first + i));
+  stepper.run();
+  std::vector<Edge> edges;
+  for (std::size_t l = 0; l < lines.size(); ++l) {
+    lines[l].begins_alive = !stepper.failed(l * n);
+    for (std::size_t i = 0; i + 1 < n; ++i)
+      if (const bool alive = !stepper.failed(l * n + i); alive == stepper.failed(l * n + i + 1))
+        edges.push_back({l, axis_.points[i], axis_.points[i + 1], alive});
+  }
+  for (int round = 0; round < halvings && !edges.empty(); ++round) {
+    stepper.clear();
+    for (const Edge& edge : edges) {
+      const Line& line = lines[edge.line];
+      Vector fresh = lattice_scores(line.first);
+      fresh[static_cast<Eigen::Index>(*plan_.failing)] = 0.5 * (edge.low + edge.high);
+      stepper.add(places[line.trial], line.from, fresh);
+    }
+    stepper.run();
+    for (std::size_t e = 0; e < edges.size(); ++e)
+      (stepper.failed(e) != edges[e].low_alive ? edges[e].low : edges[e].high) = 0.5 * (edges[e].low + edges[e].high);
+  }
+  for (const Edge& edge : edges) lines[edge.line].edges.push_back(0.5 * (edge.low + edge.high));
+}
+
+// @param lines  of one trial
+template <int Most>
+double BeliefStep<Most>::chance_of_failure(std::span<const Line> lines) const {
+  const std::size_t n = axis_.points.size();
+  double failed = 0;
+  for (const Line& line : lines) {
+    if (line.edges.empty() && line.begins_alive) continue;
+    double others = line.weight;  // weight of the line among all
+    if (plan_.lattice.size() > 1) others *= axis_.weights[line.first / n];
+    const std::vector<Interval> alive = line.alive();
+    for (std::size_t i = 0; i < n; ++i)
+      if (axis_.weights[i] > 0)
+        failed += others * axis_.weights[i] * (1 - cell_part(axis_.points[i], axis_.spread, alive).mass);
+  }
+  return std::clamp(failed, 0.0, 1.0);
+}
+
 // A cell is cut where its line fails; where its own point failed it takes the next state of the nearest that did not.
-BeliefStep::Cell BeliefStep::cell(std::size_t trial, std::size_t point, std::span<const Line> lines) const {
+template <int Most>
+typename BeliefStep<Most>::Cell BeliefStep<Most>::cell(std::size_t trial, std::size_t point,
+                                                       std::span<const Line> lines) const {
   const std::size_t n = axis_.points.size(), start = lattice_start(trial), at = point % n;
   Cell cell{.weight = 1, .anchor = point, .by_score = {}};
   for (std::size_t b = 0, rest = point; b < plan_.lattice.size(); ++b, rest /= n) {
@@ -234,23 +289,24 @@ BeliefStep::Cell BeliefStep::cell(std::size_t trial, std::size_t point, std::spa
 }
 
 // Moves a part from scores of zero to a cell, by first and second differences over the lattice.
-void BeliefStep::take_cell(BeliefMixture::Part& part, std::size_t trial, const Cell& cell) const {
+template <int Most>
+void BeliefStep<Most>::take_cell(Part& part, std::size_t trial, const Cell& cell) const {
   const std::size_t n = axis_.points.size(), here = lattice_start(trial) + cell.anchor;
   const Eigen::Index before = states() + static_cast<Eigen::Index>(stepper_.offsets());
-  const Eigen::VectorXd centre = stepper_.next(here);
+  const Vector centre = stepper_.next(here);
   std::size_t stride = 1, rest = cell.anchor;
   for (std::size_t b = 0; b < plan_.lattice.size(); ++b, stride *= n, rest /= n) {
     const std::size_t at = rest % n;
     const bool up = at + 1 < n && !stepper_.failed(here + stride), down = at > 0 && !stepper_.failed(here - stride);
-    const Eigen::VectorXd above = up ? Eigen::VectorXd(stepper_.next(here + stride)) : centre;
-    const Eigen::VectorXd below = down ? Eigen::VectorXd(stepper_.next(here - stride)) : centre;
-    Eigen::VectorXd first = Eigen::VectorXd::Zero(states()), second = first;
+    const Vector above = up ? Vector(stepper_.next(here + stride)) : centre;
+    const Vector below = down ? Vector(stepper_.next(here - stride)) : centre;
+    Vector first = Vector::Zero(states()), second = first;
     if (up || down) first = (above - below) / ((up ? axis_.spacing : 0) + (down ? axis_.spacing : 0));
     if (up && down) second = (above + below - 2 * centre) / (axis_.spacing * axis_.spacing);
     const auto& [mass, mean, variance] = cell.by_score[b];
     const double off = mean - axis_.points[at], sd = std::sqrt(variance);
     part.mean.head(states()) += first * off + 0.5 * second * (off * off + variance);
-    Eigen::VectorXd column = Eigen::VectorXd::Zero(part.mean.size());
+    Vector column = Vector::Zero(part.mean.size());
     column.head(states()) = (first + second * off) * sd;
     if (stepper_.remembers()) {
       const double fresh = std::sqrt(1 - std::pow(stepper_.memory(plan_.lattice[b]), 2));
@@ -262,46 +318,61 @@ void BeliefStep::take_cell(BeliefMixture::Part& part, std::size_t trial, const C
   }
 }
 
-AfterStep BeliefStep::on_lattice(std::size_t trial, const BeliefMixture::Part& belief, const Eigen::MatrixXd& root,
-                                 std::span<const Line> lines) const {
+template <int Most>
+AfterStep<Most> BeliefStep<Most>::on_lattice(std::size_t trial, const Part& belief, const Matrix& root,
+                                             std::span<const Line> lines) const {
   const Slopes slope = slopes(trial);
-  const BeliefMixture::Part common = part(slope, belief, root);
-  const Eigen::VectorXd bent = common.mean.head(states()) - slope.centre;
-  AfterStep after;
+  const Part common = part(slope, belief, root);
+  const Vector bent = common.mean.head(states()) - slope.centre;
+  const Matrix straight = columns(slope.first, root);
+  AfterStep<Most> after;
   for (std::size_t p = 0; p < lattice_points(); ++p) {
     const Cell here = cell(trial, p, lines);
     after.failed += here.dead;
     if (here.weight < least_weight) continue;
-    BeliefMixture::Part one = common;
+    Part one = common;
     one.log_weight = std::log(here.weight);
-    one.mean.head(states()) = Eigen::VectorXd(stepper_.next(lattice_start(trial) + here.anchor)) + bent;
+    one.mean.head(states()) = Vector(stepper_.next(lattice_start(trial) + here.anchor)) + bent;
     if (pairs() > 0) {
-      Slopes moved = slope;
-      for (std::size_t b = 0; b < plan_.lattice.size(); ++b) moved.first += here.by_score[b].mean * slope.by_score[b];
-      one.covariance = part(moved, belief, root).covariance;
+      Matrix there = straight;
+      for (std::size_t i = 0; i < pairs(); ++i) {
+        const Eigen::Index column =
+            i < used_.size() ? used_[i] : root.cols() + static_cast<Eigen::Index>(i - used_.size());
+        for (std::size_t b = 0; b < plan_.lattice.size(); ++b)
+          there.col(column).head(states()) +=
+              here.by_score[b].mean * slope.by_score[b].col(static_cast<Eigen::Index>(i));
+      }
+      one.covariance += there * there.transpose() - straight * straight.transpose();
     }
     take_cell(one, trial, here);
     after.belief.parts().push_back(std::move(one));
   }
+  if (lines.empty()) return after;
+  // The cells are those from the mean state; what they leave to failure is that from all states.
+  const double failed = chance_of_failure(lines), goes_on = std::log1p(-std::min(failed, almost_sure));
+  const double ratio = goes_on - std::log1p(-std::min(after.failed, almost_sure));
+  for (Part& one : after.belief.parts()) one.log_weight += ratio;
+  after.failed = failed;
   return after;
 }
 
-std::vector<AfterStep> BeliefStep::step(std::span<const TransitionPlace> places,
-                                        std::span<const BeliefMixture::Part> beliefs) {
-  std::vector<Eigen::MatrixXd> roots;
-  for (const BeliefMixture::Part& belief : beliefs) roots.push_back(root_of(belief.covariance));
+template <int Most>
+std::vector<AfterStep<Most>> BeliefStep<Most>::step(std::span<const TransitionPlace> places,
+                                                    std::span<const Part> beliefs) {
+  std::vector<Matrix> roots;
+  for (const Part& belief : beliefs) roots.push_back(root_of(belief.covariance));
   used_.clear();
   for (Eigen::Index i = 0; !roots.empty() && i < roots.front().cols(); ++i)
-    if (std::ranges::any_of(roots, [&](const Eigen::MatrixXd& root) { return root.col(i).head(size()).any(); }))
+    if (std::ranges::any_of(roots, [&](const Matrix& root) { return root.col(i).head(size()).any(); }))
       used_.push_back(i);
   points_ = 1 + 2 * pairs() + lattice_points() + 4 * pairs() * plan_.lattice.size();
   stepper_.clear();
   for (std::size_t t = 0; t < places.size(); ++t) add_points(places[t], beliefs[t], roots[t]);
   stepper_.run();
   std::vector<Line> edges;
-  if (plan_.failing) edges = lines(places, beliefs);
+  if (plan_.failing) edges = lines(places, beliefs, roots);
   const std::size_t by_trial = edges.size() / std::max<std::size_t>(1, places.size());
-  std::vector<AfterStep> all;
+  std::vector<AfterStep<Most>> all;
   for (std::size_t t = 0; t < places.size(); ++t) {
     if (!plan_.lattice.empty()) {
       all.push_back(on_lattice(t, beliefs[t], roots[t], std::span(edges).subspan(t * by_trial, by_trial)));
@@ -312,5 +383,8 @@ std::vector<AfterStep> BeliefStep::step(std::span<const TransitionPlace> places,
   }
   return all;
 }
+
+template class BeliefStep<small_belief>;
+template class BeliefStep<Eigen::Dynamic>;
 
 }  // namespace metastable::analysis

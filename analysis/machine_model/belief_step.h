@@ -15,46 +15,58 @@ namespace metastable::analysis {
 /// What is believed after a step, before anything is seen. The vector holds the machine's point (see
 /// MachineStepper::size()), then an error of this row for every sensor that shares errors between rows, then the one of
 /// the row before.
+template <int Most>
 struct AfterStep {
-  BeliefMixture belief;
+  BeliefMixture<Most> belief;
   double failed = 0;  ///< probability that the machine failed; the weights add up to the rest
 };
 
 /// Steps beliefs. A belief before a step holds the point and the errors of its row.
+template <int Most>
 class BeliefStep {
  public:
+  using Vector = BeliefVector<Most>;
+  using Matrix = BeliefMatrix<Most>;
+  using Part = typename BeliefMixture<Most>::Part;
+
   /// @param shared  sensors that share errors between rows
   BeliefStep(MachineStepper& stepper, const ScorePlan& plan, std::size_t shared);
-  std::vector<AfterStep> step(std::span<const TransitionPlace> places, std::span<const BeliefMixture::Part> beliefs);
+  std::vector<AfterStep<Most>> step(std::span<const TransitionPlace> places, std::span<const Part> beliefs);
 
  private:
   struct Slopes;
   struct Cell;
   using Interval = std::pair<double, double>;
-  /// One line of the lattice along the failing score, in one trial: where on it the machine goes on.
+  /// One line of the lattice along the failing score, in one trial and from one state: where on it the machine goes on.
   struct Line {
     std::size_t trial = 0, first = 0;  // of its points, of the trial's lattice
+    double weight = 1;                 // of its state, among those from which the chance of failure is taken
+    Vector from = {};                  // its state, as MachineStepper's point
     bool begins_alive = true;
     std::vector<double> edges = {};  // where going on and failing meet, ascending
     std::vector<Interval> alive() const;
   };
+  struct Edge;
 
   Eigen::Index states() const { return static_cast<Eigen::Index>(stepper_.states()); }
   Eigen::Index size() const { return static_cast<Eigen::Index>(stepper_.size()); }
   std::size_t pairs() const { return used_.size() + straight_.size(); }
   std::size_t lattice_start(std::size_t trial) const { return trial * points_ + 1 + 2 * pairs(); }
   std::size_t lattice_points() const;
-  Eigen::VectorXd lattice_scores(std::size_t point) const;
-  void add_points(const TransitionPlace& place, const BeliefMixture::Part& belief, const Eigen::MatrixXd& root);
-  std::vector<Line> lines(std::span<const TransitionPlace> places, std::span<const BeliefMixture::Part> beliefs);
-  Eigen::MatrixXd first_differences(std::size_t at, const Eigen::VectorXd* centre, Eigen::MatrixXd* bend) const;
+  Vector lattice_scores(std::size_t point) const;
+  void add_points(const TransitionPlace& place, const Part& belief, const Matrix& root);
+  std::vector<Line> lines(std::span<const TransitionPlace> places, std::span<const Part> beliefs,
+                          std::span<const Matrix> roots) const;
+  void find_edges(std::vector<Line>& lines, std::span<const TransitionPlace> places) const;
+  double chance_of_failure(std::span<const Line> lines) const;
+  Matrix first_differences(std::size_t at, const Vector* centre, Matrix* bend) const;
   Slopes slopes(std::size_t trial) const;
-  Eigen::MatrixXd columns(const Eigen::MatrixXd& slope, const Eigen::MatrixXd& root) const;
-  BeliefMixture::Part part(const Slopes& slopes, const BeliefMixture::Part& belief, const Eigen::MatrixXd& root) const;
+  Matrix columns(const Matrix& slope, const Matrix& root) const;
+  Part part(const Slopes& slopes, const Part& belief, const Matrix& root) const;
   Cell cell(std::size_t trial, std::size_t point, std::span<const Line> lines) const;
-  void take_cell(BeliefMixture::Part& part, std::size_t trial, const Cell& cell) const;
-  AfterStep on_lattice(std::size_t trial, const BeliefMixture::Part& belief, const Eigen::MatrixXd& root,
-                       std::span<const Line> lines) const;
+  void take_cell(Part& part, std::size_t trial, const Cell& cell) const;
+  AfterStep<Most> on_lattice(std::size_t trial, const Part& belief, const Matrix& root,
+                             std::span<const Line> lines) const;
 
   MachineStepper& stepper_;
   ScorePlan plan_;

@@ -20,6 +20,8 @@ constexpr std::size_t fewest_trials = 5;  // whose spread is told
 constexpr int most_waves = 24;            // of a clock, at equal ratios
 constexpr int stretches = 6;              // of the way
 constexpr double largest_memory = 0.9;
+// Zeros of sensors are known to a share of what a column spans, or to some of its errors.
+constexpr double usual_bias = 0.1, bias_errors = 3;
 constexpr double largest_share = 0.2;  // of outliers
 
 // Returns how far a parameter may vary to either side.
@@ -256,7 +258,8 @@ MachineCandidate sensor_bias(const Machine& machine, const MachineDesign& design
   one.candidate.id = "sensor_bias_" + machine.observe[sensor].state;
   one.candidate.exact = true;
   const double most = 2 * design.sd[sensor];
-  one.candidate.parameters = {{0, -most, most, fine_step * most}};
+  const double known = std::max(usual_bias * design.sd[sensor], bias_errors * machine.observe[sensor].sd.value_or(0));
+  one.candidate.parameters = {{0, -most, most, fine_step * most, 0, 0, known}};
   one.candidate.report = reporting({}, {"bias"});
   one.apply = [sensor, sensors = machine.observe.size()](MachineHypothesis& h, const Values&, const Values& v) {
     h.bias.resize(sensors);

@@ -20,8 +20,11 @@ bool unseen(const MachineRow& row) {
 }
 
 // Follows all trials of the runs under one hypothesis.
+template <int Most>
 class Follower {
  public:
+  using Part = typename BeliefMixture<Most>::Part;
+
   Follower(const Machine& machine, const MachineRuns& runs, const ScorePlan& plan, const MachineHypothesis& supposed)
       : machine_(machine), runs_(runs), plan_(plan), supposed_(supposed), stepper_(machine, runs, supposed) {
     for (std::size_t j = 0; j < machine.observe.size(); ++j) {
@@ -41,9 +44,11 @@ class Follower {
  private:
   double spread_of(std::size_t sensor) const;
   double added_variance(std::size_t sensor) const;
-  BeliefMixture::Part launched(const MachineRow& row) const;
-  Look look(std::size_t sensor, Eigen::Index size) const;
-  BeliefMixture::Part see(AfterStep& after, const MachineRow& row);
+  // A row that says nothing may be a failure, too.
+  double tolerated(double chance) const { return supposed_.wild + (1 - supposed_.wild) * chance; }
+  Part launched(const MachineRow& row) const;
+  Look<Most> look(std::size_t sensor, Eigen::Index size) const;
+  Part see(AfterStep<Most>& after, const MachineRow& row);
   void put(std::size_t event, const SeenValue& seen, double failed);
 
   const Machine& machine_;
@@ -62,7 +67,8 @@ class Follower {
   std::size_t trial_ = 0;
 };
 
-double Follower::spread_of(std::size_t sensor) const {
+template <int Most>
+double Follower<Most>::spread_of(std::size_t sensor) const {
   double count = 0, sum = 0, squares = 0;
   for (const MachineTrial& trial : runs_.trials)
     for (const MachineRow& row : trial.rows)
@@ -76,7 +82,8 @@ double Follower::spread_of(std::size_t sensor) const {
 }
 
 // Returns the variance of the error that no other row shares, with what keeps a density finite.
-double Follower::added_variance(std::size_t sensor) const {
+template <int Most>
+double Follower<Most>::added_variance(std::size_t sensor) const {
   const double floor = least_share * scale_[sensor];
   double variance = floor * floor;
   if (!supposed_.added_noise.empty()) variance += supposed_.added_noise[sensor] * supposed_.added_noise[sensor];
@@ -85,10 +92,11 @@ double Follower::added_variance(std::size_t sensor) const {
 }
 
 // The belief at a trial's first row: what was seen of it, else the launch; nothing is known of a state before.
-BeliefMixture::Part Follower::launched(const MachineRow& row) const {
+template <int Most>
+typename BeliefMixture<Most>::Part Follower<Most>::launched(const MachineRow& row) const {
   const auto size = static_cast<Eigen::Index>(stepper_.size());
-  BeliefMixture::Part belief{0, Eigen::VectorXd::Zero(size + shared_count_),
-                             Eigen::MatrixXd::Zero(size + shared_count_, size + shared_count_), 1};
+  Part belief{0, BeliefVector<Most>::Zero(size + shared_count_),
+              BeliefMatrix<Most>::Zero(size + shared_count_, size + shared_count_), 1};
   const auto states = static_cast<Eigen::Index>(stepper_.states());
   for (const MachineLaunch& launch : machine_.launches) {
     const auto s = static_cast<Eigen::Index>(machine_.state_index(launch.state));
@@ -116,8 +124,10 @@ BeliefMixture::Part Follower::launched(const MachineRow& row) const {
   return belief;
 }
 
-Look Follower::look(std::size_t sensor, Eigen::Index size) const {
-  Look look{Eigen::VectorXd::Zero(size), supposed_.bias.empty() ? 0 : supposed_.bias[sensor], added_variance(sensor)};
+template <int Most>
+Look<Most> Follower<Most>::look(std::size_t sensor, Eigen::Index size) const {
+  Look<Most> look{BeliefVector<Most>::Zero(size), supposed_.bias.empty() ? 0 : supposed_.bias[sensor],
+                  added_variance(sensor)};
   look.weights[state_[sensor]] = 1;
   if (shared_[sensor] < 0) return look;
   const auto [own, kept] = shared_error(machine_.observe[sensor].correlation);
@@ -127,7 +137,8 @@ Look Follower::look(std::size_t sensor, Eigen::Index size) const {
   return look;
 }
 
-void Follower::put(std::size_t event, const SeenValue& seen, double failed) {
+template <int Most>
+void Follower<Most>::put(std::size_t event, const SeenValue& seen, double failed) {
   out_.log_density[event] = seen.log_density;
   out_.score[event] = seen.score;
   out_.unit[event] = seen.unit;
@@ -135,9 +146,10 @@ void Follower::put(std::size_t event, const SeenValue& seen, double failed) {
 }
 
 // Sharpens the belief by a row and forgets the errors of the row before.
-BeliefMixture::Part Follower::see(AfterStep& after, const MachineRow& row) {
+template <int Most>
+typename BeliefMixture<Most>::Part Follower<Most>::see(AfterStep<Most>& after, const MachineRow& row) {
   const Eigen::Index kept = static_cast<Eigen::Index>(stepper_.size()) + shared_count_;
-  double failed = plan_.failing ? after.failed : 0;
+  double failed = plan_.failing ? tolerated(after.failed) : 0;
   std::size_t& event = cursor_[trial_];
   if (after.belief.parts().empty()) {  // it is sure to have failed, and did not
     for (const double x : row.seen)
@@ -152,46 +164,47 @@ BeliefMixture::Part Follower::see(AfterStep& after, const MachineRow& row) {
     after.belief.add_wild(supposed_.wild, wild_width);
     for (std::size_t j = 0; j < state_.size(); ++j) {
       if (std::isnan(row.seen[j])) continue;
-      put(event++, after.belief.see(look(j, kept + shared_count_), row.seen[j], failed), failed);
+      put(event++, after.belief.see(look(j, kept + shared_count_), row.seen[j], failed), failed > 0 ? after.failed : 0);
       failed = 0;
     }
   }
-  BeliefMixture::Part belief = after.belief.collapsed();
+  Part belief = after.belief.collapsed();
   belief.mean.conservativeResize(kept);
   belief.covariance.conservativeResize(kept, kept);
   return belief;
 }
 
-Evaluation Follower::follow(const std::vector<Event>& events, std::vector<double>* chances) {
+template <int Most>
+Evaluation Follower<Most>::follow(const std::vector<Event>& events, std::vector<double>* chances) {
   out_.log_density.assign(events.size(), 0.0);
   out_.score = out_.unit = out_.log_density;
   chances_ = chances;
   if (chances) chances->assign(events.size(), 0.0);
   cursor_.assign(runs_.trials.size(), events.size());
   for (std::size_t e = events.size(); e-- > 0;) cursor_[events[e].trial] = e;
-  std::vector<BeliefMixture::Part> beliefs;
+  std::vector<Part> beliefs;
   for (const MachineTrial& trial : runs_.trials)
-    beliefs.push_back(trial.rows.empty() ? BeliefMixture::Part{} : launched(trial.rows.front()));
-  BeliefStep stepping(stepper_, plan_, static_cast<std::size_t>(shared_count_));
+    beliefs.push_back(trial.rows.empty() ? Part{} : launched(trial.rows.front()));
+  BeliefStep<Most> stepping(stepper_, plan_, static_cast<std::size_t>(shared_count_));
   for (std::size_t k = 0; k < runs_.longest(); ++k) {
     std::vector<TransitionPlace> places;
-    std::vector<BeliefMixture::Part> before;
+    std::vector<Part> before;
     for (std::size_t t = 0; t < runs_.trials.size(); ++t)
       if (steps_of(runs_.trials[t]) > k && (k + 1 < runs_.trials[t].rows.size() || plan_.failing)) {
         places.push_back({t, k, first_[t] + k});
         before.push_back(beliefs[t]);
       }
     if (places.empty()) break;
-    std::vector<AfterStep> after = stepping.step(places, before);
+    std::vector<AfterStep<Most>> after = stepping.step(places, before);
     for (std::size_t i = 0; i < places.size(); ++i) {
       trial_ = places[i].trial;
       const MachineTrial& trial = runs_.trials[trial_];
       if (k + 1 < trial.rows.size()) {
         beliefs[trial_] = see(after[i], trial.rows[k + 1]);
       } else {
-        const double chance = std::clamp(after[i].failed, least_chance, 1.0);
+        const double chance = std::clamp(tolerated(after[i].failed), least_chance, 1.0);
         const double score = dynamics::normal_quantile(std::clamp(0.5 * chance, least_chance, 0.5));
-        put(cursor_[trial_]++, {std::log(chance), score, 1}, chance);
+        put(cursor_[trial_]++, {std::log(chance), score, 1}, after[i].failed);
       }
     }
   }
@@ -240,7 +253,11 @@ std::vector<Event> machine_events(const Machine& machine, const MachineRuns& run
 Evaluation follow_machine(const Machine& machine, const MachineRuns& runs, const ScorePlan& plan,
                           const std::vector<Event>& events, const MachineHypothesis& supposed,
                           std::vector<double>* chances) {
-  return Follower(machine, runs, plan, supposed).follow(events, chances);
+  std::size_t size = machine.states.size() + supposed.spreads.size() + static_cast<std::size_t>(machine.scores);
+  if (!supposed.memory.empty()) size += static_cast<std::size_t>(machine.scores);
+  for (const MachineSensor& sensor : machine.observe) size += sensor.correlation != 0 ? 2 : 0;
+  if (size <= small_belief) return Follower<small_belief>(machine, runs, plan, supposed).follow(events, chances);
+  return Follower<Eigen::Dynamic>(machine, runs, plan, supposed).follow(events, chances);
 }
 
 }  // namespace metastable::analysis

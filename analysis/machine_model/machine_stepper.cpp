@@ -35,7 +35,8 @@ void MachineStepper::clear() {
   for (std::vector<double>& one : values_) one.clear();
 }
 
-double MachineStepper::value_at(std::size_t value, const TransitionPlace& place, const Eigen::VectorXd& point) const {
+double MachineStepper::value_at(std::size_t value, const TransitionPlace& place,
+                                const Eigen::Ref<const Eigen::VectorXd>& point) const {
   double x = supposed_.values[value];
   for (const auto& one : supposed_.changes)
     if (one.value == value) x += one.transition[place.number];
@@ -46,7 +47,8 @@ double MachineStepper::value_at(std::size_t value, const TransitionPlace& place,
   return std::clamp(x, lower_[value], upper_[value]);
 }
 
-void MachineStepper::add(const TransitionPlace& place, const Eigen::VectorXd& point, const Eigen::VectorXd& fresh) {
+void MachineStepper::add(const TransitionPlace& place, const Eigen::Ref<const Eigen::VectorXd>& point,
+                         const Eigen::Ref<const Eigen::VectorXd>& fresh) {
   places_.push_back(place);
   states_.insert(states_.end(), point.data(), point.data() + states());
   const double scatter = supposed_.scatter.empty() ? 1 : supposed_.scatter[place.number];

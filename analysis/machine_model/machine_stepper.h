@@ -31,7 +31,8 @@ class MachineStepper {
 
   void clear();
   /// Adds a point. @param point  [size()] @param fresh  [scores()] normal scores of this step
-  void add(const TransitionPlace& place, const Eigen::VectorXd& point, const Eigen::VectorXd& fresh);
+  void add(const TransitionPlace& place, const Eigen::Ref<const Eigen::VectorXd>& point,
+           const Eigen::Ref<const Eigen::VectorXd>& fresh);
   /// Steps all points added. A state that is not finite counts as failed.
   void run();
   /// Says whether it counts as failed for want of a finite state alone.
@@ -41,7 +42,8 @@ class MachineStepper {
   bool failed(std::size_t point) const { return failed_[point] != 0; }
 
  private:
-  double value_at(std::size_t value, const TransitionPlace& place, const Eigen::VectorXd& point) const;
+  double value_at(std::size_t value, const TransitionPlace& place,
+                  const Eigen::Ref<const Eigen::VectorXd>& point) const;
 
   const Machine& machine_;
   const MachineRuns& runs_;

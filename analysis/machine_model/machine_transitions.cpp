@@ -21,7 +21,7 @@ constexpr double least_sensor = 1e-6, usual_sensor = 0.1;  // sd of an error tha
 constexpr double sensor_prior = 3;                         // sd of its logarithm
 constexpr double usual_wild = -7, wild_prior = 1.5, least_wild = -12;  // logit of the share of wild rows
 constexpr double parameter_step = 1e-3;  // of the sd with which it is known, for differences
-constexpr double widest_refit = 20;          // that a parameter is refitted by
+constexpr double widest_refit = 20;      // that a parameter is refitted by
 constexpr double seen_share = 1e-6;      // of a column's change, that its noise or its error must exceed
 
 double share_of(double logit) { return 1 / (1 + std::exp(-logit)); }

@@ -57,7 +57,8 @@ std::vector<Eigen::VectorXd> measured_states(const Machine& machine, const Machi
 std::vector<Eigen::VectorXd> tried_scores(Eigen::Index scores) {
   std::vector<Eigen::VectorXd> all{Eigen::VectorXd::Zero(scores)};
   for (Eigen::Index m = 0; m < scores; ++m)
-    for (const double z : {tried_score, -tried_score, far_score, -far_score}) all.push_back(z * Eigen::VectorXd::Unit(scores, m));
+    for (const double z : {tried_score, -tried_score, far_score, -far_score})
+      all.push_back(z * Eigen::VectorXd::Unit(scores, m));
   for (Eigen::Index m = 0; m < scores; ++m)
     for (Eigen::Index o = 0; o < m; ++o)
       all.push_back(tried_score * (Eigen::VectorXd::Unit(scores, m) + Eigen::VectorXd::Unit(scores, o)));

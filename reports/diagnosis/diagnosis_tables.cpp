@@ -92,7 +92,7 @@ std::vector<GapCell> beyond_chance(const analysis::GapMap& map) {
 
 Table data_table(const Diagnosis& d) {
   Table table{
-      .id = "data", .title = "Data", .notes = d.data.notes, .columns = {{"trials"}, {"collisions"}, {"transitions"}}};
+      .id = "data", .title = "Data", .notes = d.data.notes, .columns = {{"trials"}, {d.data.step_name + "s"}, {"transitions"}}};
   table.rows.push_back({d.data.trials, d.data.collisions, d.data.events});
   return table;
 }
@@ -104,8 +104,8 @@ Table gap_table(const Diagnosis& d) {
   return {.id = "gap",
           .title = "Is there a gap?",
           .columns = {{"model"}, {"against"}, {"p", "", NumberFormat::p_value, 2}},
-          .rows = {{"as given", "anything, the launch and the contact included", together(d.gap.p_as_given)},
-                   {"as given", "other contact parameters", together(d.gap.p_recalibration)},
+          .rows = {{"as given", "anything", together(d.gap.p_as_given)},
+                   {"as given", "other parameters", together(d.gap.p_recalibration)},
                    {"recalibrated", "anything else", together(d.gap.p_value)},
                    {"recalibrated", "the effects of the catalogue", together(d.gap.p_effects)},
                    {"recalibrated", "the cells of the map", together(d.gap.p_where)},
@@ -244,8 +244,9 @@ Table shrinkage_table(const Diagnosis& d) {
       .notes =
           {"Floor: the same measure on data of the last model itself. Closed: (as given − with effect) / (as given "
            "− floor); not known where the gap may be none or the interval is wider than the gap.",
-           "Nats: natural logarithms of the likelihood; a model better by 0.1 nats a collision makes each collision "
-           "exp(0.1) = 1.1 times as probable."},
+           fmt::format("Nats: natural logarithms of the likelihood; a model better by 0.1 nats a {0} makes each {0} "
+                       "exp(0.1) = 1.1 times as probable.",
+                       d.data.step_name)},
       .columns = {{"measure"},
                   {"unit"},
                   {.name = "as given (90 %)", .level = 90},
@@ -283,6 +284,10 @@ Table steps_table(const Diagnosis& d) {
     return machine.at_least ? Cell(fmt::format("at least {} (95 %)", short_number(machine.steps.lower)))
                             : Cell(machine.steps);
   };
+  // A machine that is not known to fail has no steps before it does.
+  if (!(s.observed > 0) && s.machine.empty() && std::isinf(s.baseline) && std::isinf(s.recalibrated) &&
+      std::isinf(s.with_effect))
+    return table;
   const auto here = std::ranges::find(s.machine, "", &analysis::MachineSteps::where);
   table.rows.push_back({"as measured",
                         s.observed > 0 ? Cell(Estimate{s.observed, s.observed_lower, s.observed_upper}) : Cell(""),
