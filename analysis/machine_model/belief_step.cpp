@@ -11,9 +11,10 @@ namespace {
 constexpr double reach = 1.7320508075688772;  // points at sqrt 3 sds have the normal's fourth moment
 constexpr double bend_share = 1.0 / 18;       // (h^2 - 1) / (4 h^4) with h^2 = 3
 constexpr double rounding = 1e-14;            // of a variance
-constexpr int halvings = 22;                  // of a lattice's cell, to the edge of failure
-constexpr double almost_sure = 1 - 1e-12;     // a chance of failure
-constexpr double least_weight = 1e-10;        // of a cell that counts
+// An edge of failure lies between two points of the lattice; each round divides what it lies in.
+constexpr int divisions = 4, parts_of_edge = 16;
+constexpr double almost_sure = 1 - 1e-12;  // a chance of failure
+constexpr double least_weight = 1e-10;     // of a cell that counts
 constexpr double infinite = std::numeric_limits<double>::infinity();
 
 // Returns the lower root L of L L^T = covariance, with zero columns where there is no variance of its own.
@@ -217,7 +218,7 @@ std::vector<typename BeliefStep<Most>::Line> BeliefStep<Most>::lines(std::span<c
   return all;
 }
 
-// Steps all lines and halves the edges of failure on them, all together. The points that were stepped before are needed
+// Steps all lines and seeks the edges of failure on them, all together. The points that were stepped before are needed
 // later on: this is a stepper of its own.
 template <int Most>
 void BeliefStep<Most>::find_edges(std::vector<Line>& lines, std::span<const TransitionPlace> places) const {
@@ -234,17 +235,26 @@ void BeliefStep<Most>::find_edges(std::vector<Line>& lines, std::span<const Tran
       if (const bool alive = !stepper.failed(l * n + i); alive == stepper.failed(l * n + i + 1))
         edges.push_back({l, axis_.points[i], axis_.points[i + 1], alive});
   }
-  for (int round = 0; round < halvings && !edges.empty(); ++round) {
+  for (int round = 0; round < divisions && !edges.empty(); ++round) {
     stepper.clear();
     for (const Edge& edge : edges) {
       const Line& line = lines[edge.line];
       Vector fresh = lattice_scores(line.first);
-      fresh[static_cast<Eigen::Index>(*plan_.failing)] = 0.5 * (edge.low + edge.high);
-      stepper.add(places[line.trial], line.from, fresh);
+      for (int i = 1; i < parts_of_edge; ++i) {
+        fresh[static_cast<Eigen::Index>(*plan_.failing)] = edge.low + i * (edge.high - edge.low) / parts_of_edge;
+        stepper.add(places[line.trial], line.from, fresh);
+      }
     }
     stepper.run();
-    for (std::size_t e = 0; e < edges.size(); ++e)
-      (stepper.failed(e) != edges[e].low_alive ? edges[e].low : edges[e].high) = 0.5 * (edges[e].low + edges[e].high);
+    for (std::size_t e = 0; e < edges.size(); ++e) {
+      int last = 0;  // of the points that are as the lower end
+      while (last + 1 < parts_of_edge &&
+             stepper.failed(e * (parts_of_edge - 1) + static_cast<std::size_t>(last)) != edges[e].low_alive)
+        ++last;
+      const double width = (edges[e].high - edges[e].low) / parts_of_edge;
+      edges[e].low += last * width;
+      edges[e].high = edges[e].low + width;
+    }
   }
   for (const Edge& edge : edges) lines[edge.line].edges.push_back(0.5 * (edge.low + edge.high));
 }

@@ -58,7 +58,7 @@ void measure_place(MachineDesign& design, const MachineRuns& runs) {
 MachineDesign machine_design(const Machine& machine, const MachineRuns& runs) {
   MachineDesign design;
   design.trials = runs.trials.size();
-  design.phases = runs.phases.size();
+  design.phases = runs.phases;
   design.labels = runs.labels;
   measure_columns(design, machine, runs);
   measure_place(design, runs);

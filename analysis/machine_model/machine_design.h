@@ -25,7 +25,8 @@ struct StepPlace {
 /// All steps of the runs, in the order in which MachineHypothesis numbers them, and what they cover.
 struct MachineDesign {
   std::vector<StepPlace> steps;
-  std::size_t trials = 0, phases = 0;
+  std::size_t trials = 0;
+  std::vector<std::string> phases;  ///< MachineRuns::phases
   std::vector<MachineLabel> labels;
   bool timed = false, placed = false;
   double first_time = 0, last_time = 0, usual_gap = 0;  ///< [s]; the median time of a step

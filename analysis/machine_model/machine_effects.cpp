@@ -55,6 +55,13 @@ MachineCandidate suspected(const MachineEffect& effect, std::size_t first) {
   return one;
 }
 
+// Reports a change in one of several, by its name.
+std::function<std::vector<NamedValue>(const Values&, const Values&)> changed_in(std::vector<std::string> names) {
+  return [names = std::move(names)](const Values& at, const Values& v) {
+    return std::vector<NamedValue>{{"change_in_" + names.at(static_cast<std::size_t>(at[0])), v[0]}};
+  };
+}
+
 // What one parameter of the machine may do by itself.
 class Varying {
  public:
@@ -98,12 +105,12 @@ class Varying {
     MachineCandidate one = named("_by_phase");
     one.candidate.parameters = {change()};
     one.candidate.variants.clear();
-    for (std::size_t phase = 0; phase < std::max<std::size_t>(1, design_.phases); ++phase)
+    for (std::size_t phase = 0; phase < std::max<std::size_t>(1, design_.phases.size()); ++phase)
       one.candidate.variants.push_back({static_cast<double>(phase)});
-    if (design_.phases == 2)
+    if (design_.phases.size() == 2)
       one.candidate.variants.resize(1);  // the other differs by the same, and the nominal is fitted
-    if (design_.phases < 2) one.candidate.undecidable = "the runs have no column of phases with two of them";
-    one.candidate.report = reporting({"phase"}, {"change"});
+    if (design_.phases.size() < 2) one.candidate.undecidable = "the runs have no column of phases with two of them";
+    one.candidate.report = changed_in(design_.phases);
     one.apply = adding([](const StepPlace& at, const Values& variant, std::size_t) {
       return at.phase == static_cast<int>(variant[0]) ? 1.0 : 0.0;
     });
@@ -193,7 +200,7 @@ class Varying {
       one.candidate.variants.push_back({static_cast<double>(v)});
     if (column.values.size() == 2) one.candidate.variants.resize(1);
     if (column.values.size() < 2) one.candidate.undecidable = fmt::format("{} has one value", column.name);
-    one.candidate.report = reporting({column.name + "_index"}, {"change"});
+    one.candidate.report = changed_in(column.values);
     one.apply = adding([label](const StepPlace& at, const Values& variant, std::size_t) {
       return at.labels[label] == static_cast<int>(variant[0]) ? 1.0 : 0.0;
     });

@@ -24,6 +24,8 @@ constexpr UnitFactor unit_factors[]{{180 / std::numbers::pi, "degrees where the 
                                     {1000, "thousandths of the machine's unit"},
                                     {0.001, "thousands of the machine's unit"}};
 constexpr double factor_share = 0.15;
+constexpr std::size_t fewest_for_units = 10;             // rows
+constexpr double median_of_normal = 0.6744897501960817;  // of the size of a standard normal
 
 template <class Known>
 bool every_row(const MachineRuns& runs, Known known) {
@@ -99,17 +101,23 @@ std::vector<std::string> doubled_trials(const MachineRuns& runs) {
                       doubled, runs.trials.size())};
 }
 
-// Puts the measured next values beside those of the nominal map, in the middle of its noise, and asks whether one
-// column is a unit's factor of the other.
-std::vector<std::string> other_units(const Machine& machine, const MachineRuns& runs) {
-  const std::size_t d = machine.states.size();
-  std::vector<double> states, scores, next;
-  std::vector<std::vector<double>> values(machine.value_names().size());
+// The measured rows from which the next one is known, as the nominal map takes them.
+struct NominalSteps {
+  std::vector<double> states;
+  std::vector<std::vector<double>> values;  // by value, of length 1 or one a row
   std::vector<const MachineRow*> after;
-  const std::size_t inputs = values.size() - machine.inputs.size();
+};
+
+NominalSteps nominal_steps(const Machine& machine, const MachineRuns& runs) {
+  NominalSteps all;
+  for (const MachineParameter& p : machine.parameters) all.values.push_back({p.nominal});
+  for (const MachineEffect& effect : machine.effects)
+    for (const SuspectedParameter& p : effect.parameters) all.values.push_back({p.neutral});
+  const std::size_t inputs = all.values.size();
+  all.values.resize(inputs + machine.inputs.size());
   for (const MachineTrial& trial : runs.trials)
     for (std::size_t k = 0; k + 1 < trial.rows.size(); ++k) {
-      std::vector<double> state(d, 0.0);
+      std::vector<double> state(machine.states.size(), 0.0);
       for (const MachineLaunch& launch : machine.launches) state[machine.state_index(launch.state)] = launch.mean;
       bool known = true;
       for (std::size_t j = 0; j < machine.observe.size(); ++j) {
@@ -117,35 +125,63 @@ std::vector<std::string> other_units(const Machine& machine, const MachineRuns& 
         state[machine.state_index(machine.observe[j].state)] = trial.rows[k].seen[j];
       }
       if (!known) continue;
-      states.insert(states.end(), state.begin(), state.end());
-      after.push_back(&trial.rows[k + 1]);
-      for (std::size_t i = 0; i < machine.inputs.size(); ++i) values[inputs + i].push_back(trial.rows[k].inputs[i]);
+      all.states.insert(all.states.end(), state.begin(), state.end());
+      all.after.push_back(&trial.rows[k + 1]);
+      for (std::size_t i = 0; i < machine.inputs.size(); ++i) all.values[inputs + i].push_back(trial.rows[k].inputs[i]);
     }
-  if (after.empty()) return {};
-  std::size_t v = 0;
-  for (const MachineParameter& p : machine.parameters) values[v++] = {p.nominal};
-  for (const MachineEffect& effect : machine.effects)
-    for (const SuspectedParameter& p : effect.parameters) values[v++] = {p.neutral};
-  scores.assign(after.size() * static_cast<std::size_t>(machine.scores), 0.0);
-  next.resize(states.size());
-  std::vector<std::uint8_t> failed(after.size());
-  const std::vector<std::span<const double>> spans(values.begin(), values.end());
-  machine.step({after.size(), states, scores, spans, next, failed});
+  return all;
+}
+
+// The next states with one score at `z` and the others at zero; NaN where the machine failed.
+std::vector<double> stepped(const Machine& machine, const NominalSteps& from, std::size_t score, double z) {
+  const std::size_t rows = from.after.size(), m = static_cast<std::size_t>(machine.scores);
+  std::vector<double> scores(rows * m, 0.0), next(from.states.size(), 0.0);
+  for (std::size_t i = 0; i < rows; ++i) scores[i * m + score] = z;
+  std::vector<std::uint8_t> failed(rows);
+  const std::vector<std::span<const double>> spans(from.values.begin(), from.values.end());
+  machine.step({rows, from.states, scores, spans, next, failed});
+  for (std::size_t i = 0; i < rows; ++i)
+    if (failed[i])
+      for (std::size_t s = 0; s < machine.states.size(); ++s)
+        next[i * machine.states.size() + s] = std::numeric_limits<double>::quiet_NaN();
+  return next;
+}
+
+// Puts the measured next values beside those of the nominal map, and what lies between beside its noise, and asks
+// whether one is a unit's factor of the other.
+std::vector<std::string> other_units(const Machine& machine, const MachineRuns& runs) {
+  const NominalSteps from = nominal_steps(machine, runs);
+  const std::size_t rows = from.after.size(), d = machine.states.size();
+  if (rows < fewest_for_units) return {};
+  const std::vector<double> middle = stepped(machine, from, 0, 0);
+  std::vector<double> variance(middle.size(), 0.0);
+  for (std::size_t m = 0; m < static_cast<std::size_t>(machine.scores); ++m) {
+    const std::vector<double> up = stepped(machine, from, m, 1), down = stepped(machine, from, m, -1);
+    for (std::size_t i = 0; i < middle.size(); ++i)
+      if (std::isfinite(up[i]) && std::isfinite(down[i])) variance[i] += 0.25 * (up[i] - down[i]) * (up[i] - down[i]);
+  }
   std::vector<std::string> said;
-  for (std::size_t j = 0; j < machine.observe.size(); ++j) {
-    const std::size_t s = machine.state_index(machine.observe[j].state);
-    std::vector<double> ratios;
-    for (std::size_t i = 0; i < after.size(); ++i)
-      if (!failed[i] && !std::isnan(after[i]->seen[j]) && next[i * d + s] != 0)
-        ratios.push_back(after[i]->seen[j] / next[i * d + s]);
-    if (ratios.size() < 10) continue;
-    const double ratio = median(std::move(ratios));
+  const auto suspect = [&](const std::string& state, const char* what, double ratio) {
     for (const UnitFactor& unit : unit_factors)
       if (std::abs(std::log(std::abs(ratio) / unit.factor)) < factor_share)
-        said.push_back(
-            fmt::format("{}: the measured values are {:.3g} times what the machine makes of the rows before "
-                        "them: are they in {}?",
-                        machine.observe[j].state, ratio, unit.words));
+        said.push_back(fmt::format("{}: {} {:.3g} times what the machine makes of the rows before: is it in {}?", state,
+                                   what, ratio, unit.words));
+  };
+  for (std::size_t j = 0; j < machine.observe.size(); ++j) {
+    const std::size_t s = machine.state_index(machine.observe[j].state);
+    const double error = machine.observe[j].sd.value_or(0);
+    std::vector<double> ratios, scatters;
+    for (std::size_t i = 0; i < rows; ++i) {
+      const double seen = from.after[i]->seen[j], foretold = middle[i * d + s];
+      if (std::isnan(seen) || std::isnan(foretold)) continue;
+      if (foretold != 0) ratios.push_back(seen / foretold);
+      if (const double own = variance[i * d + s] + 2 * error * error; own > 0)
+        scatters.push_back(std::abs(seen - foretold) / std::sqrt(own) / median_of_normal);
+    }
+    if (ratios.size() >= fewest_for_units)
+      suspect(machine.observe[j].state, "its values are", median(std::move(ratios)));
+    if (scatters.size() >= fewest_for_units)
+      suspect(machine.observe[j].state, "it scatters", median(std::move(scatters)));
   }
   return said;
 }

@@ -36,8 +36,8 @@ std::vector<Facet> facets(const Machine& machine, const MachineDesign& design) {
                      const double x = std::clamp(at.seen[j], -4.0, 4.0);
                      return i == 0 ? x : (x * x - 1) / std::numbers::sqrt2;
                    }});
-  if (design.phases > 1)
-    all.push_back({"phase", design.phases - 1,
+  if (design.phases.size() > 1)
+    all.push_back({"phase", design.phases.size() - 1,
                    [](const StepPlace& at, std::size_t i) { return at.phase == static_cast<int>(i) ? 1.0 : 0.0; }});
   if (design.trials > 4)
     all.push_back({"trial", 2 * waves, [](const StepPlace& at, std::size_t i) { return wave(at.run + 0.5, i); }});

@@ -1,0 +1,166 @@
+"""A simulator of one's own with logs of the real machine: the gap, its cause, and what is refused."""
+
+import unittest
+
+import numpy as np
+
+import metastable
+
+
+def step(state, noise, p):
+    swing = state[:, 0]
+    turned = swing * p["decay"] - p["loss_rad"] - p["per_rad"] * swing * swing + p["scatter_rad"] * noise[:, 0]
+    return turned[:, None], np.zeros(len(state), bool)
+
+
+def pendulum(step=step, **changes):
+    stated = dict(states=["swing_rad"], noise=1, name="a pendulum",
+                  parameters={"decay": (0.975, 0.01), "scatter_rad": (0.003, 0.003, 1e-5, 0.1)},
+                  effects={"dry_friction": {"loss_rad": (0, 0, 0.05)}, "quadratic_drag": {"per_rad": (0, 0, 0.5)}},
+                  may_vary=["decay"], sensor={"swing_rad": (0.0005, 0)})
+    return metastable.machine(step, **{**stated, **changes})
+
+
+def swung(loss=0.0, drag=0.0, decay=0.975, trials=40, swings=24, seed=3):
+    rng = np.random.default_rng(seed)
+    trial, swing = [], []
+    for t in range(trials):
+        now = 0.8 + 0.05 * rng.normal()
+        for _ in range(swings):
+            trial.append(t)
+            swing.append(now + 0.0005 * rng.normal())
+            now = now * decay - loss - drag * now * now + 0.003 * rng.normal()
+    return dict(trial=np.array(trial), swing_rad=np.array(swing))
+
+
+def diagnosed(machine=None, **done):
+    machine = machine or pendulum()
+    return metastable.diagnose(metastable.runs(machine, **swung(**done)), machine)
+
+
+class Pendulum(unittest.TestCase):
+    def test_a_machine_as_its_model_says_has_no_gap(self):
+        self.assertIn(diagnosed().verdict, ("no_gap", "recalibrate"))
+
+    def test_other_parameters_are_a_recalibration(self):
+        answer = diagnosed(decay=0.965)
+        self.assertEqual(answer.verdict, "recalibrate")
+        low, high = answer.contact.interval_90["decay"]
+        self.assertTrue(low < 0.965 < high)
+
+    def test_dry_friction_is_named_with_its_size(self):
+        answer = diagnosed(loss=0.004)
+        self.assertEqual(answer.verdict, "explained")
+        self.assertEqual(answer.at_work[0].effects, ("dry_friction",))
+        low, high = answer.at_work[0].interval_90.loss_rad  # two of its 90 % widths hold 0.004 in 99.9 % of experiments
+        self.assertLess(abs(answer.at_work[0].parameters.loss_rad - 0.004), high - low)
+        self.assertLess(high - low, 0.003)
+        self.assertGreater(answer.at_work[0].closes.alone, 0.9)
+
+    def test_the_same_seed_gives_the_same_answer_on_any_number_of_threads(self):
+        machine = pendulum()
+        runs = metastable.runs(machine, **swung(drag=0.05, trials=20))
+        one, two = (metastable.diagnose(runs, machine, threads=n) for n in (1, 2))
+        self.assertEqual([cause.to_dict() for cause in one.causes], [cause.to_dict() for cause in two.causes])
+
+    def test_columns_come_from_anything_that_has_them(self):
+        machine = pendulum(inputs=["temperature"])
+        data = dict(swung(trials=10), temperature=np.full(240, 20.0))
+        self.assertEqual(repr(metastable.runs(machine, data)), "<metastable.Runs: 10 trials, 240 rows>")
+
+
+class Failing(unittest.TestCase):
+    def test_expected_steps_are_those_of_direct_simulation(self):
+        def line(state, noise, p):
+            following = p["keeps"] * state[:, 0] + noise[:, 0]
+            return following[:, None], np.abs(following) > 3
+
+        machine = metastable.machine(line, states=["x"], noise=1, parameters={"keeps": (0.6, 0.02)}, sensor={"x": 0.05})
+        rng = np.random.default_rng(1)
+        trial, x, outcome = [], [], []
+        for t in range(60):
+            state = np.zeros(1)
+            for _ in range(30):
+                trial.append(t)
+                x.append(state[0] + 0.05 * rng.normal())
+                following, failed = line(state[:, None], rng.standard_normal((1, 1)), dict(keeps=0.6))
+                if failed[0]:
+                    break
+                state = following[:, 0]
+            outcome.append("failed" if failed[0] else "stopped")
+        answer = metastable.diagnose(metastable.runs(machine, trial=trial, x=x, outcome=outcome), machine)
+        steps, alive, state = np.zeros(4000), np.arange(4000), np.zeros((4000, 1))
+        while alive.size:
+            state, failed = line(state, rng.standard_normal((alive.size, 1)), dict(keeps=0.6))
+            steps[alive] += 1
+            alive, state = alive[~failed], state[~failed]
+        self.assertIn(answer.verdict, ("no_gap", "recalibrate"))
+        self.assertLess(abs(np.log(answer.steps_before_failure.baseline / steps.mean())), 0.1)
+        low, high = answer.steps_before_failure.machine[0].interval_90
+        self.assertTrue(low < steps.mean() < high)
+
+
+class Refused(unittest.TestCase):
+    def check(self, sentence, make, error=metastable.InputError):
+        with self.assertRaises(error) as caught:
+            make()
+        self.assertIn(sentence, str(caught.exception))
+        self.assertNotIn("\n", str(caught.exception))
+
+    def test_a_machine_that_is_none(self):
+        self.check("states: 0 are outside 1 to 30", lambda: pendulum(states=[], sensor={}))
+        self.check("\"swing\" is none of the states swing_rad", lambda: pendulum(sensor={"swing": 0.1}))
+        self.check("decay: the nominal value 2 is outside its bounds [0, 1]", lambda: pendulum(parameters={"decay": (2, 0.1, 0, 1)}))
+        self.check("may_vary: \"drag\" is none of the parameters", lambda: pendulum(may_vary=["drag"]))
+        self.check("effects: dry: loss_rad: 2 numbers given, 3 to 3 expected", lambda: pendulum(effects={"dry": {"loss_rad": (0, 1)}}))
+        self.check("correlation 0.7 between neighbouring rows is outside [-0.5, 0.5]", lambda: pendulum(sensor={"swing_rad": (0.1, 0.7)}))
+        self.check("step: a function expected", lambda: pendulum(step=3), TypeError)
+
+    def test_a_step_that_is_none(self):
+        def asked(function):
+            return lambda: diagnosed(pendulum(step=function), trials=5)
+
+        def writes(state, noise, p):
+            state[:, 0] *= p["decay"]
+            return state, np.zeros(len(state), bool)
+
+        self.check("next states of shape", asked(lambda s, z, p: (np.zeros((len(s), 2)), np.zeros(len(s), bool))), ValueError)
+        self.check("(next states, failed) is to be returned", asked(lambda s, z, p: s), TypeError)
+        self.check("step: no finite state comes of trial 1, row 1", asked(lambda s, z, p: (s * np.nan, np.zeros(len(s), bool))))
+        self.check("read-only", asked(writes), ValueError)
+
+    def test_runs_that_are_none(self):
+        machine, data = pendulum(), swung(trials=5)
+        self.check("there is no column trial", lambda: metastable.runs(machine, swing_rad=data["swing_rad"]))
+        self.check("there is no column swing_rad", lambda: metastable.runs(machine, trial=data["trial"]))
+        self.check("swing_rad: shape (3,) given, (120,) expected", lambda: metastable.runs(machine, trial=data["trial"], swing_rad=[1, 2, 3]))
+        self.check("do not stand together", lambda: metastable.runs(machine, trial=[1, 2, 1], swing_rad=[1, 2, 3]))
+        self.check("\"speed\" is none of the columns", lambda: metastable.runs(machine, speed=[1], **data))
+        still = metastable.runs(machine, trial=data["trial"], swing_rad=np.ones(120))
+        self.check("a column that is constant says nothing", lambda: metastable.diagnose(still, machine))
+        few = metastable.runs(machine, trial=[1, 1], swing_rad=[0.8, 0.7])
+        self.check("1 transitions are fewer than the 2 parameters", lambda: metastable.diagnose(few, machine))
+        apart = metastable.runs(machine, trial=[1, 2], swing_rad=[0.8, 0.7])
+        self.check("there is no transition", lambda: metastable.diagnose(apart, machine))
+        self.check("outcome: \"fell\" is none of failed, stopped, lost", lambda: metastable.diagnose(
+            metastable.runs(machine, outcome=["fell"] * 5, **data), machine))
+        self.check("runs of a machine are given with it", lambda: metastable.diagnose(few), TypeError)
+
+    def test_other_units_are_suspected_aloud(self):
+        machine, data = pendulum(), swung(trials=10)
+        answer = metastable.diagnose(metastable.runs(machine, trial=data["trial"], swing_rad=np.degrees(data["swing_rad"])), machine)
+        self.assertIn("is it in degrees where the machine has radians?", " ".join(answer.notes))
+
+    def test_data_that_are_there_twice_are_noticed(self):
+        machine, data = pendulum(), swung(trials=10)
+        twice = metastable.runs(machine, trial=np.r_[data["trial"], 10 + data["trial"]], swing_rad=np.tile(data["swing_rad"], 2))
+        self.assertIn("10 of 20 trials are there twice", " ".join(metastable.diagnose(twice, machine).notes))
+
+    def test_an_unknown_effect_is_refused_with_those_there_are(self):
+        machine = pendulum()
+        runs = metastable.runs(machine, **swung(trials=5))
+        self.check("\"friction\" is none of dry_friction", lambda: metastable.diagnose(runs, machine, catalogue="friction"))
+
+
+if __name__ == "__main__":
+    unittest.main()
