@@ -13,6 +13,8 @@ constexpr double bend_share = 1.0 / 18;       // (h^2 - 1) / (4 h^4) with h^2 = 
 constexpr double rounding = 1e-14;            // of a variance
 // An edge of failure lies between two points of the lattice; each round divides what it lies in.
 constexpr int divisions = 4, parts_of_edge = 16;
+constexpr double next_to_nothing = 1e-5;   // a chance of failure, or a weight of cells
+constexpr double worth_states = 1e-3;      // a chance of failure for which states about the mean are asked, too
 constexpr double almost_sure = 1 - 1e-12;  // a chance of failure
 constexpr double least_weight = 1e-10;     // of a cell that counts
 constexpr double infinite = std::numeric_limits<double>::infinity();
@@ -192,71 +194,105 @@ template <int Most>
 struct BeliefStep<Most>::Edge {
   std::size_t line;
   double low, high;
-  bool low_alive;
+  bool low_alive, counts;
 };
 
-// Lines along the failing score, trial by trial: first those from the mean, then those from states about it, by which
-// the chance of failure knows that the state is not known exactly.
+// Lines from the mean of one trial's belief, as the lattice has them: edges are in the middle between two points.
+template <int Most>
+std::vector<typename BeliefStep<Most>::Line> BeliefStep<Most>::rough_lines(std::size_t trial,
+                                                                           const Vector& mean) const {
+  std::vector<Line> all;
+  const std::size_t n = axis_.points.size();
+  for (std::size_t p = 0; p < lattice_points(); p += n) {
+    const std::size_t first = lattice_start(trial) + p;
+    Line& line = all.emplace_back(Line{trial, p, 1, mean, !stepper_.failed(first), {}});
+    for (std::size_t i = 0; i + 1 < n; ++i)
+      if (stepper_.failed(first + i) != stepper_.failed(first + i + 1))
+        line.edges.push_back(0.5 * (axis_.points[i] + axis_.points[i + 1]));
+  }
+  return all;
+}
+
+// Lines along the failing score, trial by trial, of the trials that may fail: first those from the mean, then those
+// from states about it, by which the chance of failure knows that the state is not known exactly. Where less
+// fails the mean will do, and where next to nothing does the lattice itself.
 template <int Most>
 std::vector<typename BeliefStep<Most>::Line> BeliefStep<Most>::lines(std::span<const TransitionPlace> places,
                                                                      std::span<const Part> beliefs,
                                                                      std::span<const Matrix> roots) const {
   const auto columns = static_cast<double>(used_.size());
   const double spread = std::max(3.0, columns);  // points at the root of it have the normal's second moment
-  std::vector<Line> all;
+  std::vector<Line> all, fine;
   for (std::size_t t = 0; t < places.size(); ++t) {
     const Vector mean = beliefs[t].mean.head(size());
-    const auto add = [&](double weight, const Vector& from) {
-      for (std::size_t p = 0; p < lattice_points(); p += axis_.points.size()) all.push_back({t, p, weight, from});
-    };
-    add(1 - columns / spread, mean);
-    for (const Eigen::Index i : used_)
-      for (const double sign : {1.0, -1.0})
-        add(0.5 / spread, mean + sign * std::sqrt(spread) * roots[t].col(i).head(size()));
+    std::vector<Line> rough = rough_lines(t, mean);
+    const double chance = chance_of_failure(rough);
+    if (chance > next_to_nothing) {
+      const bool about = chance > worth_states;
+      const auto add = [&](double weight, const Vector& from) {
+        for (std::size_t p = 0; p < lattice_points(); p += axis_.points.size()) fine.push_back({t, p, weight, from});
+      };
+      add(about ? 1 - columns / spread : 1, mean);
+      for (const Eigen::Index i : used_)
+        for (const double sign : {1.0, -1.0})
+          if (about) add(0.5 / spread, mean + sign * std::sqrt(spread) * roots[t].col(i).head(size()));
+    } else {
+      std::ranges::move(rough, std::back_inserter(all));
+    }
   }
-  find_edges(all, places);
+  if (!fine.empty()) find_edges(fine, places);
+  std::ranges::move(fine, std::back_inserter(all));
+  std::ranges::stable_sort(all, {}, &Line::trial);
   return all;
 }
 
-// Steps all lines and seeks the edges of failure on them, all together. The points that were stepped before are needed
-// later on: this is a stepper of its own.
+// Steps all lines and seeks the edges of failure on them, all together; those that hardly weigh are left between two
+// points.
 template <int Most>
 void BeliefStep<Most>::find_edges(std::vector<Line>& lines, std::span<const TransitionPlace> places) const {
   const std::size_t n = axis_.points.size();
-  MachineStepper stepper = stepper_;
-  stepper.clear();
+  MachineStepper stepper = stepper_.another();
   for (const Line& line : lines)
     for (std::size_t i = 0; i < n; ++i) stepper.add(places[line.trial], line.from, lattice_scores(line.first + i));
   stepper.run();
   std::vector<Edge> edges;
   for (std::size_t l = 0; l < lines.size(); ++l) {
     lines[l].begins_alive = !stepper.failed(l * n);
+    const double weight = plan_.lattice.size() > 1 ? axis_.weights[lines[l].first / n] : 1;
     for (std::size_t i = 0; i + 1 < n; ++i)
-      if (const bool alive = !stepper.failed(l * n + i); alive == stepper.failed(l * n + i + 1))
-        edges.push_back({l, axis_.points[i], axis_.points[i + 1], alive});
-  }
-  for (int round = 0; round < divisions && !edges.empty(); ++round) {
-    stepper.clear();
-    for (const Edge& edge : edges) {
-      const Line& line = lines[edge.line];
-      Vector fresh = lattice_scores(line.first);
-      for (int i = 1; i < parts_of_edge; ++i) {
-        fresh[static_cast<Eigen::Index>(*plan_.failing)] = edge.low + i * (edge.high - edge.low) / parts_of_edge;
-        stepper.add(places[line.trial], line.from, fresh);
+      if (const bool alive = !stepper.failed(l * n + i); alive == stepper.failed(l * n + i + 1)) {
+        const bool counts = weight * std::max(axis_.weights[i], axis_.weights[i + 1]) > next_to_nothing;
+        edges.push_back({l, axis_.points[i], axis_.points[i + 1], alive, counts});
       }
-    }
-    stepper.run();
-    for (std::size_t e = 0; e < edges.size(); ++e) {
-      int last = 0;  // of the points that are as the lower end
-      while (last + 1 < parts_of_edge &&
-             stepper.failed(e * (parts_of_edge - 1) + static_cast<std::size_t>(last)) != edges[e].low_alive)
-        ++last;
-      const double width = (edges[e].high - edges[e].low) / parts_of_edge;
-      edges[e].low += last * width;
-      edges[e].high = edges[e].low + width;
+  }
+  for (int round = 0; round < divisions; ++round) divide(edges, lines, places, stepper);
+  for (const Edge& edge : edges) lines[edge.line].edges.push_back(0.5 * (edge.low + edge.high));
+}
+
+// Divides what each edge lies in, and keeps the part that holds it.
+template <int Most>
+void BeliefStep<Most>::divide(std::vector<Edge>& edges, const std::vector<Line>& lines,
+                              std::span<const TransitionPlace> places, MachineStepper& stepper) const {
+  stepper.clear();
+  for (const Edge& edge : edges) {
+    const Line& line = lines[edge.line];
+    Vector fresh = lattice_scores(line.first);
+    for (int i = 1; i < parts_of_edge && edge.counts; ++i) {
+      fresh[static_cast<Eigen::Index>(*plan_.failing)] = edge.low + i * (edge.high - edge.low) / parts_of_edge;
+      stepper.add(places[line.trial], line.from, fresh);
     }
   }
-  for (const Edge& edge : edges) lines[edge.line].edges.push_back(0.5 * (edge.low + edge.high));
+  stepper.run();
+  std::size_t first = 0;
+  for (Edge& edge : edges) {
+    if (!edge.counts) continue;
+    std::size_t last = 0;  // points that are as the lower end
+    while (last + 1 < parts_of_edge && stepper.failed(first + last) != edge.low_alive) ++last;
+    const double width = (edge.high - edge.low) / parts_of_edge;
+    edge.low += static_cast<double>(last) * width;
+    edge.high = edge.low + width;
+    first += parts_of_edge - 1;
+  }
 }
 
 // @param lines  of one trial
@@ -381,11 +417,13 @@ std::vector<AfterStep<Most>> BeliefStep<Most>::step(std::span<const TransitionPl
   stepper_.run();
   std::vector<Line> edges;
   if (plan_.failing) edges = lines(places, beliefs, roots);
-  const std::size_t by_trial = edges.size() / std::max<std::size_t>(1, places.size());
   std::vector<AfterStep<Most>> all;
+  std::size_t line = 0;
   for (std::size_t t = 0; t < places.size(); ++t) {
     if (!plan_.lattice.empty()) {
-      all.push_back(on_lattice(t, beliefs[t], roots[t], std::span(edges).subspan(t * by_trial, by_trial)));
+      const std::size_t first = line;
+      while (line < edges.size() && edges[line].trial == t) ++line;
+      all.push_back(on_lattice(t, beliefs[t], roots[t], std::span(edges).subspan(first, line - first)));
       continue;
     }
     all.emplace_back();

@@ -57,7 +57,10 @@ class BeliefStep {
   void add_points(const TransitionPlace& place, const Part& belief, const Matrix& root);
   std::vector<Line> lines(std::span<const TransitionPlace> places, std::span<const Part> beliefs,
                           std::span<const Matrix> roots) const;
+  std::vector<Line> rough_lines(std::size_t trial, const Vector& mean) const;
   void find_edges(std::vector<Line>& lines, std::span<const TransitionPlace> places) const;
+  void divide(std::vector<Edge>& edges, const std::vector<Line>& lines, std::span<const TransitionPlace> places,
+              MachineStepper& stepper) const;
   double chance_of_failure(std::span<const Line> lines) const;
   Matrix first_differences(std::size_t at, const Vector* centre, Matrix* bend) const;
   Slopes slopes(std::size_t trial) const;

@@ -29,6 +29,8 @@ class MachineStepper {
   /// Counts what a point holds: states, then offsets of values, then the scores before, where these are remembered.
   std::size_t size() const { return states() + offsets() + (remembers() ? scores() : 0); }
 
+  /// Returns one of the same machine, runs and hypothesis without a point.
+  MachineStepper another() const { return {machine_, runs_, supposed_}; }
   void clear();
   /// Adds a point. @param point  [size()] @param fresh  [scores()] normal scores of this step
   void add(const TransitionPlace& place, const Eigen::Ref<const Eigen::VectorXd>& point,

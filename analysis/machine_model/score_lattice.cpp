@@ -9,8 +9,8 @@ namespace {
 
 // Cells of sd s at distances of 0.92 s add up to a normal density within 2 exp(-2 pi^2 / 0.92^2) = 2e-10 of it.
 constexpr double spacing_share = 0.92;
-constexpr double fine = 0.4, coarse = 0.6;            // sds of cells on one axis, and on each of two
-constexpr double fine_reach = 5.1, coarse_reach = 4;  // of the outermost cells
+constexpr double fine = 0.4, coarse = 0.7;              // sds of cells on one axis, and on each of two
+constexpr double fine_reach = 5.6, coarse_reach = 4.7;  // of the outermost, in sds of the cells' centres
 
 }  // namespace
 
@@ -19,7 +19,8 @@ LatticeAxis lattice_axis(int axes) {
   axis.spread = axes > 1 ? coarse : fine;
   axis.spacing = spacing_share * axis.spread;
   const double variance = 1 - axis.spread * axis.spread;
-  const int half = static_cast<int>(std::ceil((axes > 1 ? coarse_reach : fine_reach) / axis.spacing)) + 1;
+  const int half =
+      static_cast<int>(std::ceil((axes > 1 ? coarse_reach : fine_reach) * std::sqrt(variance) / axis.spacing)) + 1;
   double sum = 0;
   for (int i = -half; i <= half; ++i) {
     axis.points.push_back(i * axis.spacing);

@@ -9,7 +9,7 @@
 
 namespace metastable::analysis {
 
-/// One axis of a lattice: the standard normal as a mixture of normals of sd `spread` at equal distances, exact to 1e-7
+/// One axis of a lattice: the standard normal as a mixture of normals of sd `spread` at equal distances, exact to 1e-4
 /// of its density out to five sds. The first and last points serve for slopes only.
 struct LatticeAxis {
   double spread = 0, spacing = 0;

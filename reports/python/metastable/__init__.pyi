@@ -308,6 +308,25 @@ class WalkerSetting:
     def replace(self, **changes: Any) -> WalkerSetting: ...
 
 
+class Machine:
+    step: Callable[..., Tuple[ArrayLike, ArrayLike]]
+    states: Tuple[str, ...]
+    noise: int
+    parameters: Dict[str, Tuple[float, ...]]
+    effects: Dict[str, Dict[str, Tuple[float, ...]]]
+    may_vary: Tuple[str, ...]
+    sensor: Dict[str, Tuple[Optional[float], float]]
+    launch: Dict[str, Tuple[float, ...]]
+    inputs: Tuple[str, ...]
+    most_wild: float
+    name: str
+
+
+class Runs:
+    trials: int
+    rows: int
+
+
 class Walker:
     step: Step
     dimension: int
@@ -466,7 +485,7 @@ def experiment(settings: Union[Setting, Mapping[Union[str, float], Setting]], co
                noise_sd: Optional[float] = None) -> Experiment: ...
 
 
-def diagnose(experiment: Union[Experiment, Path], *, catalogue: Union[str, Sequence[str]] = (),
+def diagnose(experiment: Union[Experiment, Path, Runs], machine: Optional[Machine] = None, *, catalogue: Union[str, Sequence[str]] = (),
              at_slope: Optional[float] = None, at_speed: Optional[float] = None, seed: int = 1, threads: int = 0,
              progress: Progress = None) -> Diagnosis: ...
 
@@ -481,6 +500,17 @@ def effects() -> Tuple[Record, ...]: ...
 
 def walker(step: Step, dimension: int, noise: int, *, start: ArrayLike, names: Sequence[str] = (),
            noise_names: Sequence[str] = (), phases: int = 1, name: str = "walker") -> Walker: ...
+
+
+def machine(step: Callable[..., Tuple[ArrayLike, ArrayLike]], *, states: Sequence[str], noise: int,
+            parameters: Mapping[str, Sequence[float]], effects: Mapping[str, Mapping[str, Sequence[float]]] = {},
+            may_vary: Sequence[str] = (), sensor: Optional[Mapping[str, Any]] = None,
+            launch: Mapping[str, Sequence[float]] = {}, inputs: Sequence[str] = (), most_wild: float = 0.01,
+            name: str = "machine") -> Machine: ...
+
+
+def runs(machine: Machine, data: Any = None, *, outcome: Any = None, labels: Any = (),
+         inputs: Optional[Mapping[str, ArrayLike]] = None, **columns: Any) -> Runs: ...
 
 
 def chain(matrix: Any, kill: ArrayLike, *, threads: int = 0) -> Chain: ...
