@@ -184,6 +184,26 @@ Flexible flexible_model(const TransitionModel& model, const Fit& chosen, const E
   return f;
 }
 
+// The log score, and the CRPS where one column is observed: columns of several units have no mean distance.
+std::vector<Shrinkage> held_out_measures(const TransitionModel& model, const std::vector<HeldOut>& held,
+                                         std::uint64_t seed) {
+  std::vector<Shrinkage> all;
+  const std::vector<ObservedColumn> columns = model.columns();
+  all.push_back(
+      summarise(held, seed, "held-out log score per " + model.step_name(), "nats", [](const HeldOut& h, double* v) {
+        const double best = h.log_score[2] + h.flexible;
+        for (int m = 0; m < 3; ++m) v[m] = best - h.log_score[m] - h.flexible_floor;
+        v[3] = 0;
+      }));
+  if (columns.size() > 1) return all;
+  all.push_back(summarise(held, seed, "held-out CRPS of the next " + columns[0].name, columns[0].unit,
+                          [](const HeldOut& h, double* v) {
+                            for (int m = 0; m < 3; ++m) v[m] = h.crps[m];
+                            v[3] = h.crps_floor;
+                          }));
+  return all;
+}
+
 }  // namespace
 
 HeldOutGap gap_shrinkage(const TransitionModel& model, const Fit& given, const Fit& recalibrated,
@@ -232,20 +252,7 @@ HeldOutGap gap_shrinkage(const TransitionModel& model, const Fit& given, const F
 
   HeldOutGap result;
   for (const HeldOut& h : held) result.gap.push_back(h.log_score[2] + h.flexible - h.log_score[0] - h.flexible_floor);
-  std::vector<Shrinkage>& all = result.measures;
-  const std::vector<ObservedColumn> columns = model.columns();
-  all.push_back(
-      summarise(held, seed, "held-out log score per " + model.step_name(), "nats", [](const HeldOut& h, double* v) {
-        const double best = h.log_score[2] + h.flexible;
-        for (int m = 0; m < 3; ++m) v[m] = best - h.log_score[m] - h.flexible_floor;
-        v[3] = 0;
-      }));
-  if (columns.size() > 1) return result;  // columns of several units have no mean distance
-  all.push_back(summarise(held, seed, "held-out CRPS of the next " + columns[0].name, columns[0].unit,
-                          [](const HeldOut& h, double* v) {
-                            for (int m = 0; m < 3; ++m) v[m] = h.crps[m];
-                            v[3] = h.crps_floor;
-                          }));
+  result.measures = held_out_measures(model, held, seed);
   return result;
 }
 
