@@ -5,10 +5,13 @@
 #include <cmath>
 #include <memory>
 #include <optional>
+#include <ranges>
 #include <stdexcept>
+#include <string_view>
 #include <utility>
 
 #include "analysis/diagnosis/diagnosis.h"
+#include "analysis/experiment/suggestion.h"
 #include "analysis/machine_model/machine_transitions.h"
 #include "reports/command_line/requests.h"
 #include "reports/output/version.h"
@@ -142,7 +145,14 @@ py::dict diagnose_machine(const py::dict& machine_fields, const py::dict& runs_f
     if (batch.rows > 0) call.ask([&] { ask_step(step, names, batch); });
   };
   study.progress = [&](double share, const std::string& doing) { call.tell(share, doing); };
-  call.run([&] { found = analysis::diagnose(analysis::machine_transitions(machine, std::move(runs)), study); });
+  call.run([&] {
+    std::shared_ptr<const analysis::TransitionModel> model = analysis::machine_transitions(machine, std::move(runs));
+    const std::vector<std::string> known = model->effect_ids();
+    for (const std::string& entry : study.catalogue)
+      for (const auto id : std::views::split(entry, '+'))
+        analysis::require_word("catalogue", std::string_view(id.begin(), id.end()), known);
+    found = analysis::diagnose(std::move(model), study);
+  });
   found.model.reset();  // its map asks through this call
   return diagnosis_answer(found, {command, "machine: " + machine->name, study.seed, version()});
 }

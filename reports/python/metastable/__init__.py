@@ -178,7 +178,8 @@ def study(setting, *, method=None, cells=None, samples=None, tolerance=None, seq
           how_it_fails=False, seed=1, threads=0, time_limit=None, progress=None):
     """How many steps before it fails, with its 95 % interval, and what goes with that: `metastable steps`.
 
-    setting          a Setting (returns a Study), a WalkerSetting or a Walker (returns a WalkerStudy)
+    setting          a Setting (returns a Study), a WalkerSetting, a Walker or a Machine, which stands for its walker()
+                     (returns a WalkerStudy)
 
     Of a Setting:
     tolerance        relative half-width wanted of the interval of the expected steps, (0, 1); None: 0.01
@@ -216,6 +217,8 @@ def study(setting, *, method=None, cells=None, samples=None, tolerance=None, seq
                    memory_gb=memory_gb, how_it_fails=how_it_fails, seed=seed, threads=threads, time_limit=time_limit)
     command = _called("study", setting,
                       **{key: value for key, value in options.items() if key not in ("threads", "time_limit")})
+    if isinstance(setting, Machine):
+        setting = setting.walker()
     with _progress.telling(progress, "study") as tell:
         if isinstance(setting, Setting):
             return Study(_metastable.study(_fields(setting), options, command, tell))
@@ -223,7 +226,7 @@ def study(setting, *, method=None, cells=None, samples=None, tolerance=None, seq
             return WalkerStudy(_metastable.study_walkers([_fields(setting)], options, command, tell))
         if isinstance(setting, Walker):
             return WalkerStudy(_metastable.study_map(_fields(setting), options, command, tell))
-    raise TypeError(f"setting: a Setting, WalkerSetting or Walker expected, not {type(setting).__name__}")
+    raise TypeError(f"setting: a Setting, WalkerSetting, Walker or Machine expected, not {type(setting).__name__}")
 
 
 def compare(settings=None, *, collisions=16, method=None, cells=None, samples=None, tolerance=None, sequence=None,

@@ -5,6 +5,7 @@ import numbers
 
 import numpy
 
+import metastable
 from metastable import _metastable
 from metastable._errors import InputError
 
@@ -61,6 +62,29 @@ class Machine:
 
     def _fields(self):
         return {key: list(value) if isinstance(value, tuple) else value for key, value in self.__dict__.items()}
+
+    def walker(self, start=None, **values):
+        """Its nominal model as a Walker of one to four states, for study() and simulate().
+
+        start   the state that walks begin from; None: the means of `launch`
+        values  of parameters and of the effects' parameters that differ from the nominal and the neutral ones
+        """
+        nominal = {name: value[0] for name, value in self.parameters.items()}
+        for parameters in self.effects.values():
+            nominal.update({name: value[0] for name, value in parameters.items()})
+        unknown = set(values) - set(nominal)
+        if unknown:
+            raise InputError(f"walker: \"{sorted(unknown)[0]}\" is none of {', '.join(nominal)}")
+        if self.inputs:
+            raise InputError("walker: a machine with inputs has no steps of its own")
+        if start is None:
+            missing = [state for state in self.states if state not in self.launch]
+            if missing:
+                raise InputError(f"walker: start: launch has no {missing[0]}: give the state that walks begin from")
+            start = [self.launch[state][0] for state in self.states]
+        nominal.update(values)
+        return metastable.walker(lambda state, noise: self.step(state, noise, nominal), len(self.states), self.noise,
+                                 start=start, names=self.states, name=self.name)
 
     def __repr__(self):
         return (f"<metastable.Machine: {self.name}, states {', '.join(self.states)}, {self.noise} noise, "

@@ -95,9 +95,21 @@ class Failing(unittest.TestCase):
             steps[alive] += 1
             alive, state = alive[~failed], state[~failed]
         self.assertIn(answer.verdict, ("no_gap", "recalibrate"))
+        study = machine.walker(start=[0]).study(simulated_steps=0)
+        self.assertLess(abs(np.log(study.expected_steps.value / steps.mean())), 0.1)
+        self.check_walkers(machine)
         self.assertLess(abs(np.log(answer.steps_before_failure.baseline / steps.mean())), 0.1)
         low, high = answer.steps_before_failure.machine[0].interval_90
         self.assertTrue(low < steps.mean() < high)
+
+
+    def check_walkers(self, machine):
+        with self.assertRaisesRegex(metastable.InputError, "start: launch has no x"):
+            metastable.study(machine)
+        with self.assertRaisesRegex(metastable.InputError, "\"kept\" is none of keeps"):
+            machine.walker(start=[0], kept=0.5)
+        self.assertGreater(machine.walker(start=[0], keeps=0.4).study(simulated_steps=0).expected_steps.value,
+                           machine.walker(start=[0]).study(simulated_steps=0).expected_steps.value)
 
 
 class Refused(unittest.TestCase):
@@ -159,7 +171,8 @@ class Refused(unittest.TestCase):
     def test_an_unknown_effect_is_refused_with_those_there_are(self):
         machine = pendulum()
         runs = metastable.runs(machine, **swung(trials=5))
-        self.check("\"friction\" is none of dry_friction", lambda: metastable.diagnose(runs, machine, catalogue="friction"))
+        self.check("catalogue: 'dry_frction' is none of dry_friction", lambda: metastable.diagnose(runs, machine, catalogue="dry_frction"))
+        self.check("did you mean 'dry_friction'?", lambda: metastable.diagnose(runs, machine, catalogue=["decay_drift+dry_frction"]))
 
 
 if __name__ == "__main__":
