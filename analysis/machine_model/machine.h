@@ -53,6 +53,11 @@ struct MachineBatch {
   std::span<const std::span<const double>> values;  ///< [values] of length 1 or `rows`
   std::span<double> next;                           ///< [rows x states] to be filled in
   std::span<std::uint8_t> failed;                   ///< [rows] 1 where the machine failed; next does not count then
+
+  /// Returns a value in one row.
+  double value(std::size_t which, std::size_t row) const {
+    return values[which].size() == 1 ? values[which][0] : values[which][row];
+  }
 };
 
 struct Machine {

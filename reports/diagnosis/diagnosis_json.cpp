@@ -94,12 +94,12 @@ Json causes_json(const analysis::Diagnosis& d) {
   return all;
 }
 
-Json unnamed_json(const analysis::Unnamed& one) {
+Json unnamed_json(const analysis::Unnamed& one, const std::string& step_name) {
   Json facets = Json::array();
   for (const analysis::LeftInFacet& left : one.facets)
     facets.push_back({{"facet", left.facet},
                       {"aspect", left.aspect},
-                      {"of", left.stance ? "stances" : "collisions"},
+                      {"of", left.stance ? "stances" : step_name + "s"},
                       {"chi_squared", number(left.quadratic)},
                       {"degrees", number(left.degrees)},
                       {"p_value", number(left.p_value)},
@@ -136,7 +136,7 @@ Json unnamed_facets_json(const analysis::Diagnosis& d) {
       closes = number(1 - *d.shrinkage.measures.front().closed);
     all.push_back({{"facet", one.facet},
                    {"aspect", one.aspect},
-                   {"of", one.stance ? "stances" : "collisions"},
+                   {"of", one.stance ? "stances" : d.data.step_name + "s"},
                    {"size", one.size ? Json(number(*one.size)) : Json(nullptr)},
                    {"unit", one.unit},
                    {"probability", number(one.probability)},

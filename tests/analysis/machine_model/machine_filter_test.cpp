@@ -110,8 +110,8 @@ Machine skewed_machine(double error) {
 TEST(MachineFilter, ScoresOfASkewedLandingAreNormal) {
   for (const double error : {0.0, 0.05, 0.5}) {
     const Machine machine = skewed_machine(error);
-    const MachineRuns runs = scalar_runs(
-        200, 101, 2.0, error, 7, [](double x, double z, std::size_t) { return x / 2 + std::exp(z / 2); });
+    const MachineRuns runs =
+        scalar_runs(200, 101, 2.0, error, 7, [](double x, double z, std::size_t) { return x / 2 + std::exp(z / 2); });
     const Evaluation evaluation = followed(machine, runs, nominal_of(machine));
     ASSERT_EQ(evaluation.score.size(), 20000u);
     EXPECT_LT(kolmogorov(evaluation.score), 1.63) << error;  // 1 % of normal samples exceed it
@@ -130,9 +130,8 @@ TEST(MachineFilter, FailureHasTheProbabilityOfTheScoresThatFail) {
       batch.failed[i] = batch.scores[i] < batch.values[0][0];
     }
   };
-  MachineRuns runs = scalar_runs(20, 10, 2.0, 0.05, 11, [](double x, double z, std::size_t) {
-    return x / 2 + 1 + std::abs(z) / 2;
-  });
+  MachineRuns runs =
+      scalar_runs(20, 10, 2.0, 0.05, 11, [](double x, double z, std::size_t) { return x / 2 + 1 + std::abs(z) / 2; });
   for (std::size_t t = 0; t < 4; ++t) runs.trials[t].outcome = MachineOutcome::failed;
   const MachineHypothesis h = nominal_of(machine);
   const ScorePlan plan = score_plan(machine, runs, h);

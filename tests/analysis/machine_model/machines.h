@@ -25,12 +25,10 @@ inline Machine linear_machine(double error, double correlation = 0) {
   machine.observe = {{"x", error, correlation}};
   machine.most_wild = 0;
   machine.step = [](const MachineBatch& batch) {
-    const auto at = [&](std::size_t value, std::size_t i) {
-      return batch.values[value].size() == 1 ? batch.values[value][0] : batch.values[value][i];
-    };
     for (std::size_t i = 0; i < batch.rows; ++i) {
       const double x = batch.states[i];
-      batch.next[i] = at(0, i) * x + at(1, i) + at(2, i) * batch.scores[i] + at(3, i) * x * x;
+      batch.next[i] =
+          batch.value(0, i) * x + batch.value(1, i) + batch.value(2, i) * batch.scores[i] + batch.value(3, i) * x * x;
     }
   };
   return machine;
