@@ -262,7 +262,8 @@ std::string diagnosis_json(const analysis::Diagnosis& d, const Provenance& prove
   json["unnamed"] = unnamed_facets_json(d);
   json["p_unnamed"] = number(d.causes.p_unnamed);
   json["left"] = left_json(d);
-  json["unnamed_supposed"] = list_json(d.causes.unnamed, unnamed_json);
+  json["unnamed_supposed"] =
+      list_json(d.causes.unnamed, [&](const analysis::Unnamed& one) { return unnamed_json(one, d.data.step_name); });
   json["stepwise"] = Json::object();
   for (const auto& choice : d.causes.stepwise) json["stepwise"][choice.criterion] = choice.effects;
   json["not_decided"] = list_json(d.causes.not_decided, [](const auto& cause) {
