@@ -245,7 +245,8 @@ ChanceGains::ChanceGains(const EffectScan& scan, int draws, std::uint64_t seed) 
   }
   for (std::size_t e = 0; e < gains.size(); ++e) {
     const Candidate* effect = scan.effects[e].candidate;
-    effects_.push_back({effect, static_cast<double>(effect->parameters.size()), gains[e]});
+    const bool held = std::ranges::any_of(effect->parameters, [](const FreeParameter& p) { return p.prior_sd > 0; });
+    effects_.push_back({effect, static_cast<double>(effect->parameters.size()), held, gains[e]});
     std::sort(effects_[e].sorted.begin(), effects_[e].sorted.end(), std::greater<>());
   }
   for (int draw = 0; draw < draws; ++draw) {
@@ -263,7 +264,13 @@ double ChanceGains::p_value(const Candidate* effect, double gain) const {
   throw std::invalid_argument("ChanceGains::p_value: the effect was not scanned");
 }
 
+// What a prior holds may gain next to nothing by chance, and a gain that is no gain would stand out: its p-value is no
+// less than that of one free parameter.
 double ChanceGains::ByChance::p_value(double gain) const {
+  return held ? std::max(drawn_p_value(gain), std::erfc(std::sqrt(0.5 * std::max(0.0, gain)))) : drawn_p_value(gain);
+}
+
+double ChanceGains::ByChance::drawn_p_value(double gain) const {
   const auto draws = static_cast<double>(sorted.size());
   const auto more = static_cast<double>(
       std::lower_bound(sorted.begin(), sorted.end(), gain, [](double s, double g) { return s >= g; }) - sorted.begin());

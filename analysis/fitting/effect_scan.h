@@ -62,8 +62,10 @@ class ChanceGains {
   struct ByChance {
     const Candidate* effect;
     double degrees;              // its parameters
+    bool held;                   // by priors
     std::vector<double> sorted;  // gains, descending
     double p_value(double gain) const;
+    double drawn_p_value(double gain) const;
   };
   std::vector<ByChance> effects_;
   std::vector<double> least_;  // smallest p-value of each draw, ascending
