@@ -2,6 +2,9 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
+#include <cmath>
+#include <numbers>
 #include <optional>
 #include <stdexcept>
 
@@ -217,11 +220,47 @@ py::dict simulate_walks(const py::dict& fields, const py::dict& options, const p
   return told;
 }
 
+// Takes one step of walkers of the library, each on a slope of its own; states outside the section have fallen.
+py::tuple step_walkers(const py::dict& fields,
+                       const py::array_t<double, py::array::c_style | py::array::forcecast>& states,
+                       const py::array_t<double, py::array::c_style | py::array::forcecast>& slopes_deg) {
+  const analysis::WalkerSetting setting = walker_setting_of(Arguments(fields));
+  const dynamics::WalkerMap map = setting.map();
+  const auto rows = static_cast<std::size_t>(slopes_deg.size()), d = static_cast<std::size_t>(map.walker().dimension());
+  std::vector<double> from, next(rows * d, 0.0);
+  std::vector<dynamics::Ground> grounds;
+  std::vector<std::size_t> who;
+  std::vector<std::uint8_t> failed(rows, 1);
+  for (std::size_t i = 0; i < rows; ++i) {
+    const double* state = states.data() + i * d;
+    const double slope = slopes_deg.data()[i] * analysis::degree;
+    if (!std::all_of(state, state + d, [](double x) { return std::isfinite(x); }) || !std::isfinite(slope) ||
+        !(state[0] > 0 && state[0] < 0.5 * std::numbers::pi))
+      continue;
+    from.insert(from.end(), state, state + d);
+    grounds.push_back({slope, slope});
+    who.push_back(i);
+  }
+  std::vector<double> to(from.size());
+  std::vector<std::uint8_t> fell(who.size());
+  map.walker().step(from, grounds, to, fell);
+  for (std::size_t k = 0; k < who.size(); ++k) {
+    failed[who[k]] = fell[k];
+    std::copy_n(to.data() + k * d, d, next.data() + who[k] * d);
+  }
+  py::array_t<double> stepped({rows, d});
+  std::copy(next.begin(), next.end(), stepped.mutable_data());
+  py::array_t<bool> lost(static_cast<py::ssize_t>(rows));
+  std::transform(failed.begin(), failed.end(), lost.mutable_data(), [](std::uint8_t one) { return one != 0; });
+  return py::make_tuple(stepped, lost);
+}
+
 }  // namespace
 
 void add_maps(py::module_& module) {
   module.def("describe_walker", [](const py::dict& fields) { return walker_setting_of(Arguments(fields)).describe(); });
   module.def("study_walkers", study_walkers);
+  module.def("step_walkers", step_walkers);
   module.def("check_map", [](const py::dict& fields) {
     Call call{py::none()};
     batch_of(map_of(fields), call);

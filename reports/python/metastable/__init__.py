@@ -16,6 +16,7 @@ import decimal
 import html
 import itertools
 import json
+import math
 import numbers
 import os
 import statistics
@@ -156,6 +157,35 @@ class WalkerSetting:
     def replace(self, **changes):
         """The same setting with other values of some fields."""
         return dataclasses.replace(self, **changes)
+
+    def machine(self, *, sensor, slope_known_deg=0.1):
+        """This walker as a machine whose walks are diagnosed: diagnose(runs, machine) then takes it.
+
+        sensor           sds of the errors of its states, by name: half_angle_rad, stance_rate_rad_s and, of the compass,
+                         swing_rate_rad_s; as machine() takes them
+        slope_known_deg  sd with which the mean slope is known [deg]
+
+        The suspected effect is impact_loss, a share of the energy that a strike takes beyond the plastic one; the mean
+        slope may vary by phase, run, clock, place, state and label. The ground is one plane that tilts anew at every
+        step (terrain "fresh").
+        """
+        if self.terrain != "fresh":
+            raise InputError(f"terrain: '{self.terrain}' is no machine's: only fresh is")
+        slope = self.slope_deg if self.slope_deg is not None else {"simplest": math.degrees(0.009), "compass": 3.0}[self.walker]
+        fields = _fields(self)
+
+        def step(state, noise, p):
+            next_state, fell = _metastable.step_walkers(
+                fields, state, p["slope_deg"] + p["slope_sd_deg"] * noise[:, 0])
+            kept = numpy.broadcast_to(numpy.sqrt(1 - numpy.asarray(p["share"])), len(state))
+            next_state[:, 1:] *= kept[:, None]
+            return next_state, fell
+
+        states = ["half_angle_rad", "stance_rate_rad_s"] + (["swing_rate_rad_s"] if self.walker == "compass" else [])
+        return machine(step, states=states, noise=1, name=self.describe(), sensor=sensor, may_vary=["slope_deg"],
+                       parameters={"slope_deg": (slope, slope_known_deg),
+                                   "slope_sd_deg": (self.slope_sd_deg, self.slope_sd_deg, 1e-4 * self.slope_sd_deg, 45)},
+                       effects={"impact_loss": {"share": (0, -0.2, 0.2)}})
 
     def __repr__(self):
         return _repr(self)
