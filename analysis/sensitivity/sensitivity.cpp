@@ -121,8 +121,10 @@ Moves moves(const Setting& setting, const Sensitivity& one, double step) {
 class IntegratedRows {
  public:
   // @param problem  of the setting
-  IntegratedRows(const Setting& setting, const Problem& problem, const ExactRows& rows, std::size_t panels, int threads)
-      : setting_(setting), rows_(rows), panels_(panels), threads_(threads) {
+  // @param landings  of the tables of moved settings
+  IntegratedRows(const Setting& setting, const Problem& problem, const ExactRows& rows, std::size_t panels,
+                 LandingOptions landings)
+      : setting_(setting), rows_(rows), panels_(panels), landings_(std::move(landings)) {
     for (int p = 0; p < problem.map.phases(); ++p) lowest_.push_back(problem.map.state_interval(p).first);
     const markov::SampledChain here = chain(setting);
     adjoint_ = markov::adjoint(markov::ChainSolver(here.chain), here.launch);
@@ -139,7 +141,7 @@ class IntegratedRows {
 
  private:
   markov::SampledChain chain(const Setting& near) const {
-    const Problem problem = near.problem({.threads = threads_});
+    const Problem problem = near.problem(landings_);
     std::vector<double> shift;
     for (int p = 0; p < problem.map.phases(); ++p)
       shift.push_back(problem.map.state_interval(p).first - lowest_[static_cast<std::size_t>(p)]);
@@ -149,17 +151,16 @@ class IntegratedRows {
   const Setting& setting_;
   const ExactRows& rows_;
   std::size_t panels_;
-  int threads_;
+  LandingOptions landings_;
   std::vector<double> lowest_;  // state of a survivor, by phase
   markov::Adjoint adjoint_;
 };
 
 std::vector<Sensitivity> by_rows(const Setting& setting, const Metastability& study, const StudyOptions& options) {
-  const Problem problem = setting.problem({.threads = options.threads});
+  const Problem problem = setting.problem();
   const ExactRows rows(problem, options.tolerance, options.threads);
   const std::size_t panels = std::max<std::size_t>(2, study.cells / rows.coarsest());
-  const IntegratedRows fine(setting, problem, rows, panels, options.threads),
-      coarse(setting, problem, rows, panels / 2, options.threads);
+  const IntegratedRows fine(setting, problem, rows, panels, {}), coarse(setting, problem, rows, panels / 2, {});
   std::vector<Sensitivity> list = candidates(setting, !setting.wheel.equal_legs());
   for (std::size_t i = 0; i < list.size(); ++i) {
     if (options.progress)
@@ -181,15 +182,21 @@ bool of_contact(Parameter parameter) {
 // Takes, under `settled`, differences of rows, whatever the study was made with, with a table each for a wheel or slope
 // moved to either side. The error is that of the nodes, and of two tables where there are two.
 std::vector<Sensitivity> by_tables(const Setting& setting, const Metastability& study, const StudyOptions& options) {
-  const Problem problem = setting.problem({.threads = options.threads});
+  const Problem problem = setting.problem(landing_options(options, 0, 0));
   const ExactRows rows(problem, options.tolerance, options.threads);
-  const IntegratedRows fine(setting, problem, rows, table_panels, options.threads),
-      coarse(setting, problem, rows, table_panels / 2, options.threads);
   std::vector<Sensitivity> list = candidates(setting, !setting.wheel.equal_legs());
-  for (std::size_t i = 0; i < list.size(); ++i) {
-    Sensitivity& one = list[i];
-    if (options.progress)
-      options.progress(static_cast<double>(i) / static_cast<double>(list.size()), sensitivity_name(one));
+  std::size_t taken = 0;
+  StudyOptions within = options;
+  if (options.progress)
+    within.progress = [&](double, const std::string& what) {
+      options.progress(static_cast<double>(taken) / static_cast<double>(list.size()), what);
+    };
+  const LandingOptions landings = landing_options(within);
+  const IntegratedRows fine(setting, problem, rows, table_panels, landings),
+      coarse(setting, problem, rows, table_panels / 2, landings);
+  for (; taken < list.size(); ++taken) {
+    Sensitivity& one = list[taken];
+    if (within.progress) within.progress(0, sensitivity_name(one));
     const bool same_table = of_contact(one.parameter);
     const double step = width(setting, one.parameter) * (same_table ? 10 * integrated_step
                                                          : one.leg  ? leg_table_step

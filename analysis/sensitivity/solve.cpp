@@ -48,7 +48,7 @@ Setting with_value(const Setting& base, Parameter parameter, double value) {
 // Studies the setting with the target's last step as the end of its course.
 Metastability study_for(const Setting& setting, const Target& target, const StudyOptions& options) {
   const Setting launched = steadily_launched(setting, options);
-  Problem problem = launched.problem({options.direct, options.threads, {}});
+  Problem problem = launched.problem(landing_options(options));
   if (target.of == Target::Of::survival) problem.last_event = target.steps;
   Metastability found = study(problem, options);
   found.setting = launched;
@@ -233,8 +233,12 @@ Solution solve(const Setting& setting, Parameter parameter, const Target& target
   StudyOptions brief = study_options;
   brief.brief = true;
   // On one slope one table of landings serves all points.
-  if (setting.law == dynamics::Law::settled && parameter != Parameter::slope)
-    with_value(setting, parameter, from).problem({.threads = options.threads});
+  if (parameter != Parameter::slope) {
+    StudyOptions first = study_options;
+    first.threads = options.threads;
+    if (options.tabulating) first.progress = [&](double share, const std::string&) { options.tabulating(share); };
+    tabulate_landings(with_value(setting, parameter, from), first);
+  }
   Kept kept;
   const auto at = [&](double value, int threads) {
     StudyOptions own = brief;

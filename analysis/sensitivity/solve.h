@@ -47,6 +47,8 @@ struct SolveOptions {
   std::size_t points = 17;                                   ///< looked at first, ends included, 3 .. 1000
   int threads = 0;                                           ///< 0: all cores
   std::function<void(std::size_t looked_at)> progress = {};  ///< may throw to stop
+  /// It is called while the table of landings that the points share under `settled` is built; may throw to stop.
+  std::function<void(double share)> tabulating = {};
 };
 
 /// One value of the parameter looked at, with the target's quantity there.

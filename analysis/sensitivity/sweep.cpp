@@ -143,11 +143,7 @@ void sweep(const Setting& base, const std::vector<SweepAxis>& axes, std::size_t 
   const std::size_t size = sweep_size(axes);
   if (begin >= size) return;
   // The first table of landings is built by all threads together; on one slope it serves all points.
-  if (base.law == dynamics::Law::settled) try {
-      sweep_setting(base, axes, begin).problem({.threads = options.threads});
-    } catch (const markov::ConvergenceError&) {
-      // A table that cannot be had is said at its points.
-    }
+  tabulate_landings(sweep_setting(base, axes, begin), options);
   std::mutex mutex;
   std::map<std::size_t, SweepPoint> waiting;  // finished before an earlier point
   std::size_t next = begin;

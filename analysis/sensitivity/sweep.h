@@ -58,8 +58,9 @@ SweepPoint sweep_point(const Setting& base, const std::vector<SweepAxis>& axes, 
 /// Studies points begin .. end-1 in brief (StudyOptions::brief), calling done(index, point) for each in this order, one
 /// call at a time (from whichever thread finished it); done may throw to stop. A point whose solver does not converge
 /// has the status solver_failed and its message, and no numbers. Points run side by side on the options' threads, each
-/// single-threaded: the numbers do not depend on that. options.progress is called within the points, always with 0; it
-/// may throw to stop.
+/// single-threaded: the numbers do not depend on that. Under `settled`
+/// options.progress is told how far the first table of landings is, which all threads build together; then it is called
+/// within the points, always with 0. It may throw to stop.
 void sweep(const Setting& base, const std::vector<SweepAxis>& axes, std::size_t begin, const StudyOptions& options,
            const std::function<void(std::size_t, const SweepPoint&)>& done,
            RigidBodies rigid_bodies = RigidBodies::left_out);

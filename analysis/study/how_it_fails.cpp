@@ -200,7 +200,7 @@ LastMoments how_it_fails(const Setting& setting, const Metastability& study, con
   if (std::isinf(study.steps.from_start.value)) return nothing("the expected steps are infinite or not resolved");
   if (setting.noise_free()) return nothing("without noise every step is the same");
   if (study.method == Method::followed) return nothing("the noise is too narrow for cells of states");
-  const Problem problem = setting.problem({options.direct, options.threads});
+  const Problem problem = setting.problem(landing_options(options));
   const StudyOptions own = deep_enough(options, study.spectrum.failure_rate.value);
   const bool beside = study.steps.safe_state.has_value();
   const std::optional<Pilot> pilot = solve_pilot(problem, own, beside);

@@ -361,6 +361,24 @@ bool fast_launch_rests(const Setting& setting) {
 
 }  // namespace
 
+LandingOptions landing_options(const StudyOptions& options, double from, double to) {
+  LandingOptions landings{options.direct, options.threads, {}};
+  if (options.progress)
+    landings.progress = [tell = options.progress, from, to](double share) {
+      tell(from + (to - from) * share, "table of landings");
+    };
+  return landings;
+}
+
+void tabulate_landings(const Setting& setting, const StudyOptions& options) {
+  if (setting.law != dynamics::Law::settled) return;
+  try {
+    setting.problem(landing_options(options));
+  } catch (const markov::ConvergenceError&) {
+    // The studies will say so.
+  }
+}
+
 Metastability study(const Setting& setting, const StudyOptions& options) {
   check_setting(setting, options.method);
   // A table of landings takes part of the time.
@@ -378,14 +396,11 @@ Metastability study(const Setting& setting, const StudyOptions& options) {
   const bool by_table = tabulates && options.progress;
   constexpr double of_table = 0.3;
   StudyOptions own = options;
-  std::function<void(double)> table_progress;
-  if (by_table) {
-    table_progress = [&](double share) { options.progress(of_table * share, "table of landings"); };
+  if (by_table)
     own.progress = [&](double share, const std::string& what) {
       options.progress(of_table + (1 - of_table) * share, what);
     };
-  }
-  const Problem problem = setting.problem({options.direct, options.threads, table_progress});
+  const Problem problem = setting.problem(landing_options(options, 0, of_table));
   if (!setting.steady_launch || setting.steady_speed) {
     Metastability result = study(problem, own);
     result.setting = setting;
@@ -398,9 +413,8 @@ Metastability study(const Setting& setting, const StudyOptions& options) {
     second.progress = [&](double share, const std::string& what) { own.progress(0.5 + 0.5 * share, what); };
   }
   const Setting launched = steadily_launched(setting, first);
-  if (by_table)  // of faster launches it may be another one
-    table_progress = [&](double) { own.progress(0.5, "table of landings"); };
-  Metastability result = study(launched.problem({options.direct, options.threads, table_progress}), second);
+  // Of faster launches the table may be another one.
+  Metastability result = study(launched.problem(landing_options(own, 0.5, 0.5)), second);
   result.setting = launched;
   return result;
 }

@@ -71,6 +71,15 @@ enum class Status {
   no_regime,          ///< only in sweeps: there is no metastable regime to launch from, see the message
 };
 
+/// Returns where the landings of a study with these options come from; the table's progress is told to options.progress
+/// as a part of the work, that in [from, to].
+LandingOptions landing_options(const StudyOptions& options, double from = 0, double to = 1);
+
+/// Builds the table of landings of a setting under `settled`, which studies of this wheel and slope then find built
+/// (SettledMap::of). It does nothing where they need none; where none can be had, the studies say why.
+/// @throws std::invalid_argument as study(), and what options.progress throws
+void tabulate_landings(const Setting& setting, const StudyOptions& options);
+
 /// A value below which a share `level` of all launches stay.
 struct Quantile {
   double level = 0;  ///< in (0, 1)

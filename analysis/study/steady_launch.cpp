@@ -64,7 +64,7 @@ bool noise_free(const Setting& setting) {
 
 Setting steadily_launched(const Setting& setting, const StudyOptions& options) {
   if (!setting.steady_launch || setting.steady_speed) return setting;
-  const Problem problem = setting.problem({options.direct, options.threads, {}});
+  const Problem problem = setting.problem(landing_options(options, 0, 0));
   const auto launched = [&](const dynamics::LaunchSpeed& speed) {
     Setting found = setting;
     found.steady_speed = std::make_shared<const dynamics::LaunchSpeed>(speed);

@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <atomic>
 #include <chrono>
 #include <cmath>
 #include <ctime>
@@ -85,8 +86,9 @@ class Trend {
 // Finds the friction up to `high` from which slip stops in an impact, or before its compression ends; `high` if it does
 // not stop there either.
 double stopping_friction(const SettledMotion& motion, int leg, double omega, double eta, int strike,
-                         double SlipLeft::*when, double high, const Trend& trend) {
+                         double SlipLeft::*when, double high, const Trend& trend, const std::function<void()>& tell) {
   const auto value = [&](double mu) {
+    tell();
     const std::optional<SlipLeft> left = motion.slip_left(leg, omega, {eta, mu}, strike);
     return left ? -((*left).*when) : -1;  // without an impact it slides on
   };
@@ -152,9 +154,18 @@ class Told {
   Told(const std::function<void(double)>& progress, double from, double to, std::size_t count)
       : progress_(progress), from_(from), to_(to), count_(count) {}
   void one_more() { tell(1); }
-  void still() { tell(0); }
+  /// The work goes on, and nothing more of it is done. It may be called at every landing: it passes few calls on.
+  void still() {
+    using namespace std::chrono;
+    const milliseconds::rep now = duration_cast<milliseconds>(steady_clock::now().time_since_epoch()).count();
+    if (now - told_at_.load(std::memory_order_relaxed) < often) return;
+    told_at_.store(now, std::memory_order_relaxed);
+    tell(0);
+  }
 
  private:
+  static constexpr std::chrono::milliseconds::rep often = 20;
+
   void tell(std::size_t more) {
     const std::lock_guard lock(mutex_);
     done_ += more;
@@ -164,6 +175,7 @@ class Told {
   const std::function<void(double)>& progress_;
   double from_, to_;
   std::size_t count_, done_ = 0;
+  std::atomic<std::chrono::milliseconds::rep> told_at_ = 0;
   std::mutex mutex_;
 };
 
@@ -251,12 +263,15 @@ std::shared_ptr<const SettledMap> SettledMap::of(const SettledWheel& wheel, cons
   }
 }
 
-double SettledMap::standstill(int leg, double eta) const {
+double SettledMap::standstill(int leg, double eta, const std::function<void()>& tell) const {
   // These are speeds so low that a sticking foot is carried back; there are none for a slope without barrier.
   const double barrier = motion_.foot(leg).barrier_squared();
   if (!(barrier > 0)) return 0;
   const double mu = sticking_[static_cast<std::size_t>(leg)] + clear_of_sticking;
-  const auto value = [&](double omega) { return beyond_barrier(motion_.land(leg, omega, {eta, mu}), barrier); };
+  const auto value = [&](double omega) {
+    tell();
+    return beyond_barrier(motion_.land(leg, omega, {eta, mu}), barrier);
+  };
   double low = 0.5 * std::sqrt(barrier), high = 1.5 * std::sqrt(barrier);
   double at_low = value(low), at_high = value(high);
   while (at_low >= 0 && low > 1e-3) low /= 2, at_low = value(low);
@@ -267,9 +282,13 @@ double SettledMap::standstill(int leg, double eta) const {
 }
 
 // @param guess from which to start, 0: none; @param off how far off it may be
-double SettledMap::solve_resting(int leg, double omega, double eta, double guess, double off) const {
+double SettledMap::solve_resting(int leg, double omega, double eta, double guess, double off,
+                                 const std::function<void()>& tell) const {
   const double barrier = motion_.foot(leg).barrier_squared();
-  const auto value = [&](double mu) { return beyond_barrier(motion_.land(leg, omega, {eta, mu}), barrier); };
+  const auto value = [&](double mu) {
+    tell();
+    return beyond_barrier(motion_.land(leg, omega, {eta, mu}), barrier);
+  };
   double high = sticking_[static_cast<std::size_t>(leg)] + clear_of_sticking, at_high = value(high);
   if (at_high < 0) return never;
   // Around the guess it searches, or step by step from above: at high omega and eta there are gaps in rest below.
@@ -297,19 +316,20 @@ double SettledMap::solve_resting(int leg, double omega, double eta, double guess
 
 // Finds the bend at two speeds and three restitutions: where the landing has risen by a quarter of its rise over [mu_r,
 // mu_c], log(1 + part / bend) shall have, too.
-void SettledMap::find_bend(SettledTable& table, int leg) const {
+void SettledMap::find_bend(SettledTable& table, int leg, const std::function<void()>& tell) const {
   const SettledRange& range = options_.range;
   const double sticking = sticking_[static_cast<std::size_t>(leg)];
   const double high_eta = std::min(0.5, range.eta_high), low_eta = std::min(range.eta_low, high_eta - 0.1);
   std::array<double, 3> at_0{}, rate{}, eta{};
   for (std::size_t j = 0; j < 3; ++j) {
     eta[j] = std::max(0.0, low_eta + (high_eta - low_eta) * static_cast<double>(j) / 2);
-    const double from = standstill(leg, eta[j]);
+    const double from = standstill(leg, eta[j], tell);
     std::array<double, 2> omega{}, found{};
     for (std::size_t s = 0; s < 2; ++s) {
       omega[s] = from + (std::min(range.omega_high, from + 4) - from) * (s == 0 ? 0.3 : 0.8);
-      const double resting = solve_resting(leg, omega[s], eta[j], 0, 0);
+      const double resting = solve_resting(leg, omega[s], eta[j], 0, 0, tell);
       const auto kept = [&](double part) {
+        tell();
         return motion_.land(leg, omega[s], {eta[j], resting + part * (sticking - resting)}).carried_squared;
       };
       const double first = kept(1e-9), quarter = first + (kept(1) - first) / 4;
@@ -345,17 +365,16 @@ void SettledMap::find_bend(SettledTable& table, int leg) const {
   parabola(rate, &table.bend[3]);
 }
 
-// Finds the frictions where the landing has kinks, and mu_r, at all speeds of one restitution. Calls tell() at each: in
-// a row of feet that chatter a speed takes a second.
+// Finds the frictions where the landing has kinks, and mu_r, at all speeds of one restitution. It calls tell() at each
+// landing: where feet chatter one search takes a second.
 void SettledMap::find_edges(SettledTable& table, int leg, int row, const std::function<void()>& tell) const {
   constexpr int stops = SettledTable::stops;
   const double eta = table.eta(row), still = table.standstill[static_cast<std::size_t>(row)];
   std::array<Trend, stops + 1> trend;
   for (int i = 0; i < table.speeds; ++i) {
-    tell();
     const double omega = table.speed(still, static_cast<double>(i) / (table.speeds - 1));
     double* edge = &table.edges[static_cast<std::size_t>((row * table.speeds + i) * (stops + 1))];
-    double resting = solve_resting(leg, omega, eta, trend[stops].next(), trend[stops].off());
+    double resting = solve_resting(leg, omega, eta, trend[stops].next(), trend[stops].off(), tell);
     if (!(resting < table.sticking)) resting = table.sticking - 1e-9;
     trend[stops].add(edge[stops] = resting);
     for (int n = 0; n < stops; ++n) {
@@ -363,7 +382,7 @@ void SettledMap::find_edges(SettledTable& table, int leg, int row, const std::fu
       if (row >= table.smooth_rows) continue;
       const auto [strike, when] = stop_of(n);
       edge[n] = stopping_friction(motion_, leg, omega, eta, strike, when, n == 0 ? table.sticking : edge[n - 1],
-                                  trend[static_cast<std::size_t>(n)]);
+                                  trend[static_cast<std::size_t>(n)], tell);
       trend[static_cast<std::size_t>(n)].add(edge[n]);
     }
   }
@@ -377,7 +396,6 @@ void SettledMap::tabulate(SettledTable& table, int leg, int row, const std::func
   find_edges(table, leg, row, tell);
   int* known = &table.known[static_cast<std::size_t>(row) * (stops + 1)];
   for (int i = 0; i < table.speeds; ++i) {
-    tell();
     const double omega = table.speed(still, static_cast<double>(i) / (table.speeds - 1));
     const auto at = static_cast<std::size_t>(row * table.speeds + i);
     const double* edge = &table.edges[at * (stops + 1)];
@@ -386,6 +404,7 @@ void SettledMap::tabulate(SettledTable& table, int leg, int row, const std::func
     double* displacement = &table.displacement[at * static_cast<std::size_t>(table.places())];
     unsigned unknown = 0;
     const auto note = [&](int n, double mu) {
+      tell();
       const Landing landing = motion_.land(leg, omega, {eta, mu});
       const bool rests = landing.end == LandingEnd::rest || landing.end == LandingEnd::given_up;
       *kept++ = (rests ? landing.settled_squared : landing.carried_squared) / (omega * omega);
@@ -473,14 +492,16 @@ void SettledMap::build() {
   const bool alike = std::all_of(length.begin(), length.end(), [&](double one) { return one == length.front(); });
   table_.assign(alike ? 1 : length.size(), empty);
   Told bends(options_.progress, 0, bends_found, table_.size());
+  const auto still = [&] { bends.still(); };
   options_.executor(table_.size(), [&](std::size_t leg) {
     SettledTable& table = table_[leg];
     table.sticking = sticking_[leg];
     for (int j = 0; j < table.rows; ++j)
-      table.standstill[static_cast<std::size_t>(j)] = standstill(static_cast<int>(leg), table.eta(j));
+      table.standstill[static_cast<std::size_t>(j)] =
+          standstill(static_cast<int>(leg), table.eta(j), still);
     const double highest = *std::max_element(table.standstill.begin(), table.standstill.end());
     table.usable = highest + SettledTable::clear_of_rest < range.omega_high;
-    if (table.usable) find_bend(table, static_cast<int>(leg));
+    if (table.usable) find_bend(table, static_cast<int>(leg), still);
     bends.one_more();
   });
   const auto per_leg = static_cast<std::size_t>(empty.rows);
@@ -510,9 +531,10 @@ double SettledMap::resting_friction(int leg, double omega, double eta) const {
   return table && table->holds(omega) ? table->resting_friction(omega) : followed_resting_friction(leg, omega, eta);
 }
 
-double SettledMap::followed_resting_friction(int leg, double omega, double eta, double guess) const {
+double SettledMap::followed_resting_friction(int leg, double omega, double eta, double guess,
+                                             const std::function<void()>& tell) const {
   constexpr double off = 2e-4;
-  return solve_resting(leg, omega, eta, guess, off);
+  return solve_resting(leg, omega, eta, guess, off, tell);
 }
 
 MappedLanding SettledMap::follow(int leg, double omega, const Contact& contact) const {
@@ -553,7 +575,8 @@ void SettledMap::check() {
                    : mu < table.sticking                                                ? sliding
                                                                                         : sticking;
     const bool solves = index % 8 == 0 && !is_rough;
-    const double off_resting = solves ? std::abs(followed_resting_friction(leg, omega, eta, resting) - resting) : 0;
+    const double off_resting =
+        solves ? std::abs(followed_resting_friction(leg, omega, eta, resting, [&] { told.still(); }) - resting) : 0;
     const std::lock_guard lock(mutex);
     ++found.landings;
     if (solves) found.resting_off.push_back(off_resting);

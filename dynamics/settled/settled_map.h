@@ -27,7 +27,8 @@ struct SettledMapOptions {
   int checks = 400;                                    ///< landings per leg that the table is held against
   /// Calls the work for every index in [0, count), in any order, from any threads; by default one after the other.
   std::function<void(std::size_t count, const std::function<void(std::size_t)>& work)> executor;
-  std::function<void(double share)> progress;  ///< called now and then, from any thread, one at a time
+  /// Called now and then, within the search of one mu_r too, from any thread, one at a time; it may throw to stop.
+  std::function<void(double share)> progress;
 };
 
 /// Holds a table against landings that are followed, in one region.
@@ -81,8 +82,10 @@ class SettledMap {
   MappedLanding land(int leg, double omega, const Contact& contact) const;
   /// Does the same, followed whatever the table holds.
   MappedLanding follow(int leg, double omega, const Contact& contact) const;
-  /// Returns mu_r, found by landings that are followed. @param guess from which to start; 0: none
-  double followed_resting_friction(int leg, double omega, double eta, double guess = 0) const;
+  /// Returns mu_r, found by some dozens of landings that are followed. @param guess from which to start; 0: none
+  /// @param tell  called before each of them; it may throw to stop
+  double followed_resting_friction(
+      int leg, double omega, double eta, double guess = 0, const std::function<void()>& tell = [] {}) const;
   /// Returns the table at one restitution, to read many landings from; nothing where there is no table.
   std::optional<SettledSlice> slice(int leg, double eta) const;
   /// Returns omega-^2 at the next touch [rad^2/s^2], for a landing that does not rest.
@@ -99,10 +102,11 @@ class SettledMap {
   void build();
   void find_edges(SettledTable& table, int leg, int row, const std::function<void()>& tell) const;
   void tabulate(SettledTable& table, int leg, int row, const std::function<void()>& tell) const;
-  void find_bend(SettledTable& table, int leg) const;
+  void find_bend(SettledTable& table, int leg, const std::function<void()>& tell) const;
   void check();
-  double standstill(int leg, double eta) const;
-  double solve_resting(int leg, double omega, double eta, double guess, double off) const;
+  double standstill(int leg, double eta, const std::function<void()>& tell) const;
+  double solve_resting(int leg, double omega, double eta, double guess, double off,
+                       const std::function<void()>& tell) const;
 
   SettledMotion motion_;
   SettledMapOptions options_;

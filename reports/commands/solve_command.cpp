@@ -25,22 +25,33 @@ using SolveJson = nlohmann::ordered_json;
 
 constexpr double looks_a_crossing = 12;  // about, for the progress line
 
-// Tells of points looked at, from any thread.
+// Tells of the table that the points share, and then of points looked at, from any thread.
 class Looking {
  public:
-  Looking(Tell tell, std::size_t points)
-      : tell_(std::move(tell)), all_(static_cast<double>(points) + looks_a_crossing) {}
+  Looking(BeginPart begin, std::size_t points)
+      : begin_(std::move(begin)), all_(static_cast<double>(points) + looks_a_crossing) {}
+  void tabulating(double share) {
+    const std::scoped_lock lock(mutex_);
+    part("table of landings")(share, "");
+  }
   void looked_at(std::size_t points) {
     const std::scoped_lock lock(mutex_);
     looked_at_ = static_cast<double>(points);
-    tell_(std::min(0.99, looked_at_ / all_), "solve");
+    part("solve")(std::min(0.99, looked_at_ / all_), "");
   }
   void still() {
     const std::scoped_lock lock(mutex_);
-    tell_(std::min(0.99, looked_at_ / all_), "solve");
+    part("solve")(std::min(0.99, looked_at_ / all_), "");
   }
 
  private:
+  const Tell& part(const char* name) {
+    if (name_ != name) tell_ = begin_(name_ = name);
+    return tell_;
+  }
+
+  BeginPart begin_;
+  std::string name_;
   Tell tell_;
   std::mutex mutex_;
   double all_, looked_at_ = 0;
@@ -129,8 +140,9 @@ SolveJson target_json(const Target& target) {
 SolveAnswer answer_solve(const SolveRequest& request, const BeginPart& begin) {
   SolveAnswer answer;
   {
-    Looking looking(begin("solve"), request.solve.points);
+    Looking looking(begin, request.solve.points);
     analysis::SolveOptions options = request.solve;
+    options.tabulating = [&](double share) { looking.tabulating(share); };
     options.progress = [&](std::size_t points) { looking.looked_at(points); };
     analysis::StudyOptions study = request.study;
     study.progress = [&](double, const std::string&) { looking.still(); };

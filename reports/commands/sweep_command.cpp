@@ -12,6 +12,7 @@
 #include "reports/output/interrupt.h"
 #include "reports/output/progress.h"
 #include "reports/output/version.h"
+#include "reports/study/study_progress.h"
 
 namespace metastable::reports {
 namespace {
@@ -132,6 +133,12 @@ void run_sweep(const SweepRequest& request) {
       return row(request, analysis::sweep_point(request.setting, request.axes, point, study, rolled));
     });
   run_sweep_file(sweep, [&](std::size_t had, const auto& add) {
+    if (had < size) {  // all points of one slope share the first one's table of landings
+      ProgressParts parts;
+      analysis::StudyOptions table = request.study;
+      table.progress = parts.begin()("table of landings");
+      analysis::tabulate_landings(analysis::sweep_setting(request.setting, request.axes, had), table);
+    }
     Progress progress("sweep", size);
     progress.skip(had);
     analysis::sweep(

@@ -5,12 +5,18 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdint>
+#include <string>
 #include <vector>
 
 #include "analysis/sensitivity/comparison.h"
+#include "analysis/sensitivity/sensitivity.h"
+#include "analysis/sensitivity/solve.h"
+#include "analysis/sensitivity/sweep.h"
 #include "analysis/study/certify.h"
+#include "analysis/study/how_it_fails.h"
 #include "analysis/study/metastability.h"
 #include "analysis/study/rest_reachability.h"
+#include "analysis/study/steady_launch.h"
 #include "dynamics/return_map/trials.h"
 #include "markov/parallel.h"
 #include "tests/analysis/settings.h"
@@ -101,6 +107,34 @@ TEST(SettledStudy, MethodsAgreeWhereFailuresAreRare) {
   EXPECT_LT(integrated.steps.discretization_error, 0.01);
   EXPECT_LT(sampled.steps.from_start.lower, integrated.steps.from_start.upper);
   EXPECT_GT(sampled.steps.from_start.upper, integrated.steps.from_start.lower);
+}
+
+// A table of landings takes seconds to minutes: whatever is asked tells of it, and ends when its listener throws.
+TEST(SettledStudy, EveryQuestionTellsOfItsTableAndCanBeStopped) {
+  struct Stopped {};
+  StudyOptions options;
+  options.progress = [](double, const std::string& what) {
+    if (what == "table of landings") throw Stopped();
+  };
+  Setting setting = settled(7.02, {0.4, 0.05}, {0.4, 0.03}, true);
+  setting.wheel.hub_mass = 1.41;  // a wheel whose table no other test builds
+  Setting steady = setting;
+  steady.steady_launch = true;
+  Metastability found;
+  found.setting = setting;
+  found.steps.from_start = {100, 99, 101};
+  EXPECT_THROW(study(setting, options), Stopped);
+  EXPECT_THROW(steadily_launched(steady, options), Stopped);
+  EXPECT_THROW(how_it_fails(setting, found, options), Stopped);
+  EXPECT_THROW(sensitivities(found, options), Stopped);
+  const std::vector<SweepAxis> axes = {{Parameter::friction_mean, {0.4, 0.5}}};
+  EXPECT_THROW(sweep(setting, axes, 0, options, [](std::size_t, const SweepPoint&) {}), Stopped);
+  EXPECT_THROW(sweep_point(setting, axes, 0, options), Stopped);
+  const Target target{Target::Of::steps, 100, 0};
+  EXPECT_THROW(solve(setting, Parameter::friction_mean, target, {}, options), Stopped);
+  EXPECT_THROW(solve(setting, Parameter::slope, target, {}, options), Stopped);
+  EXPECT_THROW(solve(setting, Parameter::friction_mean, target, {.tabulating = [](double) { throw Stopped(); }}, {}),
+               Stopped);
 }
 
 TEST(SettledStudy, HasNoProvenBoundsAndNoSafeSlope) {

@@ -71,6 +71,33 @@ TEST(SettledMap, TheThresholdIsFoundFromAnyGuess) {
     EXPECT_NEAR(map->followed_resting_friction(0, 5, 0.4, guess), resting, 1e-8) << guess;
 }
 
+TEST(SettledMap, ASearchOfOneThresholdCanBeStopped) {
+  SettledMapOptions options;
+  options.direct = true;
+  const auto map = SettledMap::of(paper_wheel(7.02), options);
+  struct Stopped {};
+  int told = 0;
+  EXPECT_THROW(map->followed_resting_friction(0, 5, 0.4, 0,
+                                              [&] {
+                                                if (++told == 3) throw Stopped();
+                                              }),
+               Stopped);
+  EXPECT_EQ(told, 3);
+}
+
+// Before the first part of a table is done thresholds are searched, for seconds where feet chatter.
+TEST(SettledMap, ATableTellsBeforeItsFirstPartIsDone) {
+  constexpr int foreseen_from = 96;  // landings, each of which is told too
+  SettledMapOptions options = narrow();
+  options.executor = nullptr;
+  struct Stopped {};
+  int at_none = 0;
+  options.progress = [&](double share) {
+    if (share == 0 && ++at_none > foreseen_from) throw Stopped();
+  };
+  EXPECT_THROW(SettledMap::of(paper_wheel(7.3), options), Stopped);
+}
+
 TEST(SettledMap, WithoutATableLandingsAreFollowed) {
   SettledMapOptions options;
   options.direct = true;
