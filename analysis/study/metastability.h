@@ -56,7 +56,8 @@ struct StudyOptions {
   bool brief = false;             ///< leave out seconds, metres, spectrum, mixing and violated assumptions (sweeps do)
   std::size_t largest_cells = 1024;        ///< refinement stops here
   std::size_t largest_samples = 1u << 18;  ///< and here
-  /// It is called now and then with the work done so far in [0, 1] and what is being done, and may throw to stop.
+  /// It is called now and then, from any thread, with the work done so far in [0, 1] and what is being done, and may
+  /// throw to stop. Of a part it may hear later again with less.
   std::function<void(double, const std::string&)> progress = {};
   void validate() const;
 };

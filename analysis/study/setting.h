@@ -24,7 +24,9 @@ struct Spread {
 struct LandingOptions {
   bool direct = false;  ///< every landing followed instead of read from a table, hundreds of times slower
   int threads = 0;      ///< of the table, 0: all cores
-  std::function<void(double share)> progress = {};  ///< of the table, from any thread
+  /// Called now and then, from any thread, one at a time: of the table, and with 1 while landings are followed or
+  /// integrated later; it may throw to stop.
+  std::function<void(double share)> progress = {};
 };
 
 /// Holds everything that fixes the chain of one wheel on one ramp.

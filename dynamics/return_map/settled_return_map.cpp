@@ -84,6 +84,7 @@ SettledReturnMap::SettledReturnMap(const Wheel& wheel, double slope, ContactNois
                                    SettledMapOptions options)
     : geometry_(wheel, slope, Law::settled, std::move(noise)) {
   options = widened(std::move(options), highest_speed);
+  if (options.progress) listener_ = std::make_shared<NowAndThen>([progress = options.progress] { progress(1); });
   landings_ = SettledMap::of(settled_wheel(wheel, slope), options);
   // A small wheel rests up to high speeds.
   if (landings_->untabulated() && options.range.omega_high < most_speed) {
@@ -113,14 +114,17 @@ double SettledReturnMap::arrival(int phase, const MappedLanding& landed) const {
 
 MappedLanding SettledReturnMap::land(int phase, double omega, const Contact& contact) const {
   const std::optional<SettledSlice> table = landings_->slice(phase, contact.restitution);
-  if (!table) return landings_->follow(phase, omega, contact);
+  if (!table) {
+    tell();
+    return landings_->follow(phase, omega, contact);
+  }
   if (omega < table->lowest_speed()) return {0, 0, true};
   return table->at(omega).land(contact.friction);
 }
 
 double SettledReturnMap::resting_friction(int phase, double omega, double eta) const {
   const std::optional<SettledSlice> table = landings_->slice(phase, eta);
-  if (!table) return landings_->followed_resting_friction(phase, omega, eta);
+  if (!table) return landings_->followed_resting_friction(phase, omega, eta, 0, [this] { tell(); });
   return omega < table->lowest_speed() ? std::numeric_limits<double>::infinity() : table->resting_friction(omega);
 }
 
@@ -136,6 +140,7 @@ std::optional<double> SettledReturnMap::landing(double state, int phase, std::sp
 
 // Lists points over eta, each with its mu_r: where either the landing or the rest from there counts.
 std::vector<SettledReturnMap::EtaPoint> SettledReturnMap::restitutions(double omega, int phase) const {
+  tell();
   const TruncatedNormal &restitution = noise().restitution(), &friction = noise().friction();
   const auto resting = [&](double eta) { return resting_friction(phase, omega, eta); };
   if (restitution.constant()) return {{restitution.mean(), 1, resting(restitution.mean())}};
@@ -345,6 +350,7 @@ std::optional<double> SettledReturnMap::landing_defect(double state, int phase, 
   const Contact contact = noise().draw(score);
   const auto of = [&](const MappedLanding& landed) { return landed.rest ? 0 : f(arrival(phase, landed)); };
   const auto difference = [&] {
+    tell();
     return of(landings_->follow(phase, omega, contact)) - of(land(phase, omega, contact));
   };
   if (noise().is_empirical() || noise().correlation() != 0 || noise().friction().constant()) return difference();
@@ -354,7 +360,8 @@ std::optional<double> SettledReturnMap::landing_defect(double state, int phase, 
   // Where hardly any friction lets the wheel pass, the threshold is not worth finding: feet chatter for long there.
   constexpr double reach = 0.05, negligible = 1e-9;
   if (friction.complement(read - reach) * f(state_interval(phase + 1).first) < negligible) return difference();
-  const double followed = landings_->followed_resting_friction(phase, omega, contact.restitution, read);
+  const double followed =
+      landings_->followed_resting_friction(phase, omega, contact.restitution, read, [this] { tell(); });
   const auto [low, high] = std::minmax(read, followed);
   if (!std::isfinite(high)) return difference();
   const double between = (friction.cdf(read) - friction.cdf(followed)) * f(state_interval(phase + 1).first);
@@ -369,6 +376,7 @@ double SettledReturnMap::worth(int phase, const Landing& landing, const std::fun
 // Returns mu_r of the landing that a rolling wheel is about to make.
 double SettledReturnMap::resting_friction(const SettledRoll& roll, double restitution, double guess) const {
   const auto rests_at = [&](double mu) {
+    tell();
     SettledRoll one = roll;
     one.set_contact({restitution, mu});
     const LandingEnd end = one.land().end;
@@ -408,8 +416,8 @@ std::optional<double> SettledReturnMap::memory_defect(double state, int phase, s
   on.set_contact(second);
   const double moving = worth(next, on.land(), f), standing = worth(next, motion.land(next, omega, second), f);
   if (noise().is_empirical() || noise().correlation() != 0 || noise().friction().constant()) return moving - standing;
-  const double stands = landings_->followed_resting_friction(next, omega, second.restitution,
-                                                             resting_friction(next, omega, second.restitution));
+  const double stands = landings_->followed_resting_friction(
+      next, omega, second.restitution, resting_friction(next, omega, second.restitution), [this] { tell(); });
   const double moves = resting_friction(roll, second.restitution, std::min(stands, landings_->sticking_friction(next)));
   const TruncatedNormal& friction = noise().friction();
   const auto resting = [&](double mu) { return std::isfinite(mu) ? friction.cdf(mu) : 1.0; };
@@ -429,6 +437,7 @@ bool SettledReturnMap::violates(int which, double state, int phase, std::span<co
     const SettledSlice::SliceAtSpeed place = slice->at(omega);
     if (contact.friction < place.resting_friction() || !place.rough(contact.friction)) return false;
   }
+  tell();
   return landings_->motion().land(phase, omega, contact).end == LandingEnd::unsettled;
 }
 

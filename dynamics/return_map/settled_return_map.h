@@ -12,6 +12,7 @@
 #include <vector>
 
 #include "dynamics/return_map/wheel_map.h"
+#include "dynamics/settled/now_and_then.h"
 #include "dynamics/settled/settled_map.h"
 
 namespace metastable::dynamics {
@@ -25,7 +26,8 @@ class SettledRoll;
 class SettledReturnMap {
  public:
   /// @param wheel with its slope; @param noise eta within [0, most_settled_restitution]
-  /// @param options of the table; its range is widened to `highest_speed` [rad/s], at most 20 rad/s
+  /// @param options of the table; its range is widened to `highest_speed` [rad/s], at most 20 rad/s. Its progress is
+  /// told 1 now and then once the table is built, while landings are followed or integrated: it may throw to stop
   /// @throws std::invalid_argument as SettledMap::of and WheelMap
   SettledReturnMap(const Wheel& wheel, double slope, ContactNoise noise, double highest_speed,
                    SettledMapOptions options = {});
@@ -92,6 +94,9 @@ class SettledReturnMap {
     double eta, weight, resting_friction;
   };
   // Reads from the table where there is one: below its speeds the wheel rests, above them it keeps the last's share.
+  void tell() const {
+    if (listener_) (*listener_)();
+  }
   MappedLanding land(int phase, double omega, const Contact& contact) const;
   double resting_friction(int phase, double omega, double eta) const;
   double next_state(int phase, double omega, const Contact& contact) const;  // rest_landing's value at rest
@@ -106,6 +111,7 @@ class SettledReturnMap {
   std::shared_ptr<const SettledMap> landings_;
   double highest_state_;
   std::vector<double> advance_;
+  std::shared_ptr<NowAndThen> listener_;
 };
 
 }  // namespace metastable::dynamics

@@ -3,7 +3,6 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <atomic>
 #include <chrono>
 #include <cmath>
 #include <ctime>
@@ -13,6 +12,8 @@
 #include <mutex>
 #include <stdexcept>
 #include <utility>
+
+#include "dynamics/settled/now_and_then.h"
 
 namespace metastable::dynamics {
 namespace {
@@ -154,18 +155,9 @@ class Told {
   Told(const std::function<void(double)>& progress, double from, double to, std::size_t count)
       : progress_(progress), from_(from), to_(to), count_(count) {}
   void one_more() { tell(1); }
-  /// The work goes on, and nothing more of it is done. It may be called at every landing: it passes few calls on.
-  void still() {
-    using namespace std::chrono;
-    const milliseconds::rep now = duration_cast<milliseconds>(steady_clock::now().time_since_epoch()).count();
-    if (now - told_at_.load(std::memory_order_relaxed) < often) return;
-    told_at_.store(now, std::memory_order_relaxed);
-    tell(0);
-  }
+  void still() { still_(); }  ///< nothing more is done; it may be called at every landing
 
  private:
-  static constexpr std::chrono::milliseconds::rep often = 20;
-
   void tell(std::size_t more) {
     const std::lock_guard lock(mutex_);
     done_ += more;
@@ -175,8 +167,8 @@ class Told {
   const std::function<void(double)>& progress_;
   double from_, to_;
   std::size_t count_, done_ = 0;
-  std::atomic<std::chrono::milliseconds::rep> told_at_ = 0;
   std::mutex mutex_;
+  NowAndThen still_{[this] { tell(0); }};
 };
 
 void in_order(std::size_t count, const std::function<void(std::size_t)>& work) {
@@ -497,8 +489,7 @@ void SettledMap::build() {
     SettledTable& table = table_[leg];
     table.sticking = sticking_[leg];
     for (int j = 0; j < table.rows; ++j)
-      table.standstill[static_cast<std::size_t>(j)] =
-          standstill(static_cast<int>(leg), table.eta(j), still);
+      table.standstill[static_cast<std::size_t>(j)] = standstill(static_cast<int>(leg), table.eta(j), still);
     const double highest = *std::max_element(table.standstill.begin(), table.standstill.end());
     table.usable = highest + SettledTable::clear_of_rest < range.omega_high;
     if (table.usable) find_bend(table, static_cast<int>(leg), still);

@@ -3,17 +3,20 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <atomic>
 #include <chrono>
 #include <memory>
 
 namespace metastable::reports {
 
 std::function<void(double, const std::string&)> study_progress(Progress& progress) {
-  auto done = std::make_shared<std::size_t>(0);
+  auto done = std::make_shared<std::atomic<std::size_t>>(0);
   return [&progress, done](double share, const std::string&) {
     const auto now = static_cast<std::size_t>(std::clamp(share, 0.0, 1.0) * static_cast<double>(study_units));
-    progress.advance(now > *done ? now - *done : 0);
-    *done = std::max(*done, now);
+    std::size_t before = *done;
+    while (before < now && !done->compare_exchange_weak(before, now)) {
+    }
+    progress.advance(now > before ? now - before : 0);
   };
 }
 

@@ -14,7 +14,7 @@ namespace metastable::reports {
 inline constexpr std::size_t study_units = 1000;
 
 /// Returns a callback for analysis::StudyOptions::progress that moves `progress` by up to study_units over the study.
-/// The callback refers to `progress`; it throws Interrupted after Ctrl-C.
+/// The callback refers to `progress` and may be called from any thread; it throws Interrupted after Ctrl-C.
 std::function<void(double, const std::string&)> study_progress(Progress& progress);
 
 /// A listener that is told the share of the work done and what is being done; it may throw to stop. As
