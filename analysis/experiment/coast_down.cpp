@@ -276,6 +276,7 @@ std::string objection(const CoastDownRun& run, const RevolutionLoss& nominal) {
 }
 
 double run_to_run_of(const std::vector<CoastDownRun>& runs, bool linear) {
+  constexpr double most = dynamics::range::run_to_run.high;
   double slow = 0, fast = std::numeric_limits<double>::infinity();
   std::vector<RevolutionLoss> losses;
   for (const CoastDownRun& run : runs) {
@@ -292,7 +293,17 @@ double run_to_run_of(const std::vector<CoastDownRun>& runs, bool linear) {
     for (const RevolutionLoss& loss : losses)
       squares += std::pow(loss.at(omega) / mean - 1, 2) / static_cast<double>(speeds.size());
   }
-  return std::sqrt((squares + usual_run_to_run * usual_run_to_run) / count);
+  const double share = std::sqrt((squares + usual_run_to_run * usual_run_to_run) / count);
+  if (share <= most) return share;
+  const auto by_loss = [&](const RevolutionLoss& a, const RevolutionLoss& b) {
+    return a.at(speeds[1]) < b.at(speeds[1]);
+  };
+  const auto [least, largest] = std::minmax_element(losses.begin(), losses.end(), by_loss);
+  const auto name = [&](auto one) { return runs[static_cast<std::size_t>(one - losses.begin())].name; };
+  throw std::invalid_argument(fmt::format(
+      "loss: from run to run it differs by {:.0f} % of its mean, more than {:.0f} %: at {:.3g} rad/s {} loses {:.3g} "
+      "rad^2/s^2 a revolution and {} {:.3g}; give runs of one loss, or state a nominal one (--nominal)",
+      100 * share, 100 * most, speeds[1], name(least), least->at(speeds[1]), name(largest), largest->at(speeds[1])));
 }
 
 ExperimentFiles coast_down_files(const std::vector<CoastDownRun>& runs, const RevolutionLoss& nominal,

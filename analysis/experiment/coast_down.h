@@ -75,7 +75,8 @@ std::string objection(const CoastDownRun& run, const RevolutionLoss& nominal);
 
 /// Returns by how much the loss differs between runs of one drum: an sd, as a share of the loss, over the speeds that
 /// all of them had. One more difference of usual_run_to_run is counted, because runs are few.
-/// @param runs  two or more @param linear  as for fit_loss @throws std::invalid_argument as fit_loss
+/// @param runs  two or more @param linear  as for fit_loss
+/// @throws std::invalid_argument as fit_loss, and for runs that differ by more than an experiment may state
 double run_to_run_of(const std::vector<CoastDownRun>& runs, bool linear);
 
 /// Returns the folder: one condition a run, blocks as trials in their order.

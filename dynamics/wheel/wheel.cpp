@@ -37,6 +37,16 @@ void Wheel::validate() const {
     throw std::invalid_argument(fmt::format("leg_length: {} legs are given, 3 or more are needed", leg_length.size()));
   for (std::size_t i = 0; i < leg_length.size(); ++i)
     require_positive(fmt::format("leg_length[{}]", i).c_str(), leg_length[i], "m");
+  for (std::size_t i = 0; i < leg_length.size(); ++i)
+    for (const std::size_t beside : {i + leg_length.size() - 1, i + 1}) {
+      const double neighbour = leg_length[beside % leg_length.size()], least = neighbour * std::cos(leg_angle());
+      if (leg_length[i] > least) continue;
+      throw std::invalid_argument(
+          fmt::format("leg_length[{}]: {} m is outside ({:.4g}, inf) m: beside a leg of {} m, {:.4g} deg from it, a "
+                      "shorter one has the "
+                      "hub past it as it lands, or never lands",
+                      i, leg_length[i], least, neighbour, leg_angle() * 180 / std::numbers::pi));
+    }
   require_positive("hub_mass", hub_mass, "kg");
   if (inertia) require_positive("inertia", *inertia, "kg m^2");
   if (contact_mass) require_positive("contact_mass", *contact_mass, "kg");

@@ -13,8 +13,10 @@ std::vector<double> paper_leg_lengths();
 
 /// Describes a rimless wheel. Defaults are the paper's, in SI units.
 struct Wheel {
-  std::vector<double> leg_length = paper_leg_lengths();  ///< L_i [m], in the order they land; 3 or more, each > 0
-  double hub_mass = 1.39;                                ///< M [kg], > 0
+  /// L_i [m], in the order they land; 3 or more, each > 0 and longer than a neighbour's length times cos alpha: a
+  /// shorter one has the hub past it as it lands, or never lands.
+  std::vector<double> leg_length = paper_leg_lengths();
+  double hub_mass = 1.39;  ///< M [kg], > 0
   /// The inertia about the stance foot, I [kg m^2], > 0. Where it is not given see stance_inertia().
   std::optional<double> inertia;
   /// The radius of gyration about the hub, r_g [m], >= 0. Where it is not given, each law has its own default.
@@ -39,8 +41,7 @@ struct Triangle {
   double hub_height = 0;       ///< h [m], of the hub over the ramp = y_cp
   double beta_first_rad = 0;   ///< angle of the stance leg to the ramp [rad]
   double beta_second_rad = 0;  ///< angle of the landing leg to the ramp [rad]
-  double contact_x = 0;  ///< x_cp [m] = second leg * cos(beta_second_rad), a distance; negative only if the foot lies
-                         ///< uphill of the hub
+  double contact_x = 0;  ///< x_cp [m] = second leg * cos(beta_second_rad), by which the foot lies downhill of the hub
 };
 /// @param first, second leg lengths [m]; @param leg_angle alpha [rad]
 Triangle triangle(double first, double second, double leg_angle);

@@ -305,7 +305,7 @@ std::size_t MeshGrowth::bytes() const {
 void MeshGrowth::require_memory() {
   if (largest(static_cast<double>(bytes())) > static_cast<double>(options_.most_bytes))
     throw std::length_error(
-        fmt::format("mesh: spacing {:.3g} takes more than {:.1f} GB, {} nodes and {} entries so far", options_.spacing,
+        fmt::format("mesh: spacing {:.3g} takes more than {:.2g} GB, {} nodes and {} entries so far", options_.spacing,
                     static_cast<double>(options_.most_bytes) / 0x1p30, sum(static_cast<double>(rows())),
                     sum(static_cast<double>(entries_))));
 }

@@ -27,7 +27,8 @@ struct MeshStudyOptions {
   std::uint64_t seed = 1;
   int threads = 0;                                ///< 0: all cores; the bits do not depend on it
   std::size_t guided_samples = 4000;              ///< 0: none
-  std::uint64_t simulated_steps = 2000000;        ///< direct simulation takes about so many steps; 0: none at all
+  /// Direct simulation takes about so many steps, in 10^7 trials to failure at most; 0: none at all.
+  std::uint64_t simulated_steps = 2000000;
   std::size_t most_bytes = std::size_t{3} << 30;  ///< of all meshes held at once
   /// It is called with the share of the time that all takes, 0 until that can be foretold (from the coarsest mesh on),
   /// from any thread but one at a time, and may throw to stop. The share falls back where more work turns up.

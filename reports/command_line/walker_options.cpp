@@ -70,9 +70,8 @@ void add_walker(Options& o, const std::string& sd, bool meshes) {
         "1.0); the two or three finer ones follow by sqrt 2",
         spacings);
   o.add("simulated-steps", "N", "",
-        "With --walker: about how many steps direct simulation takes beside, however rare failures are, 0..10^12 "
-        "(default: "
-        "2000000; 0: none)");
+        "With --walker: about how many steps direct simulation takes beside, however rare failures are, 0..10^12, in "
+        "10^7 walks to failure at most (default: 2000000; 0: none)");
   o.add("memory", "GB", "", "With --walker: most memory of its meshes (default: 3); what they would take is foreseen",
         gigabytes);
 }

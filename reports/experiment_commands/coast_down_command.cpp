@@ -116,7 +116,9 @@ void run_coast_down(const CoastDownRequest& request) {
   const Provenance provenance{request.command, origin, 0, version()};
   const analysis::ExperimentFiles files = analysis::coast_down_files(
       runs, nominal, request.rotor_inertia, "Coast-down of " + runs.front().name, provenance_lines(provenance));
-  folder.write(analysis::source_of(files, request.out));
+  const analysis::ExperimentSource source = analysis::source_of(files, request.out);
+  analysis::parse_experiment(source);  // what could not be read back is refused here, and not written
+  folder.write(source);
   answer.fact("folder", request.out);
   answer.fact("constant", nominal.constant);
   answer.fact("linear", nominal.linear);

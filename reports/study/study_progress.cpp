@@ -30,10 +30,14 @@ TimeLimitReached::TimeLimitReached(double seconds, double share, const std::stri
 BeginPart within(double seconds, const BeginPart& begin) {
   const auto began = std::chrono::steady_clock::now();
   return [=](const std::string& name) -> Tell {
+    auto furthest = std::make_shared<std::atomic<double>>(0);
     return [=, tell = begin(name)](double share, const std::string& what) {
       if (tell) tell(share, what);
+      double before = *furthest;
+      while (before < share && !furthest->compare_exchange_weak(before, share)) {
+      }
       if (std::chrono::duration<double>(std::chrono::steady_clock::now() - began).count() > seconds)
-        throw TimeLimitReached(seconds, share, name);
+        throw TimeLimitReached(seconds, *furthest, name);
     };
   };
 }

@@ -89,6 +89,23 @@ TEST(CoastDown, SaysHowRunsDiffer) {
   EXPECT_NEAR(run_to_run_of({first, other}, false), std::sqrt((2 * 0.05 * 0.05 + 0.03 * 0.03) / 2), 0.008);
 }
 
+// Runs that differ by more than an experiment may state are no basis of one.
+TEST(CoastDown, RunsOfTwoLossesAreRefused) {
+  CoastDownRun light = run_of(ticks(0.05, 0.0007, 0.005, 3)), heavy = run_of(ticks(0.25, 0.0035, 0.005, 4));
+  light.name = "light", heavy.name = "heavy";
+  EXPECT_GT(run_to_run_of({light, run_of(ticks(0.09, 0.00126, 0.005, 4))}, false), 0.15);
+  try {
+    run_to_run_of({light, heavy}, false);
+    FAIL();
+  } catch (const std::invalid_argument& error) {
+    const std::string said = error.what();
+    EXPECT_NE(said.find("loss: from run to run it differs by 67 % of its mean, more than 50 %"), std::string::npos)
+        << said;
+    EXPECT_NE(said.find("rad/s light loses "), std::string::npos) << said;
+    EXPECT_NE(said.find("and heavy "), std::string::npos) << said;
+  }
+}
+
 TEST(CoastDown, FolderIsReadBack) {
   CoastDownRun run = run_of(ticks(0.15, 0.002, 0.05, 5));
   run.name = "free";

@@ -132,6 +132,14 @@ TEST(MeshStudy, GivesNoNumberWhereAGaitIsATrap) {
   EXPECT_THROW(mesh_study(TwoGaits{3, 0.12, 0.85}.batch(), start, quick()), Disagreement);
 }
 
+// Each trial takes memory, so that their number has an end where the steps allowed have none.
+TEST(MeshStudy, SimulatesTenMillionTrialsAtMost) {
+  const std::vector<double> start{2};
+  const MeshStudy study = mesh_study(linear_batch(8), start, {.guided_samples = 0, .simulated_steps = 1000000000000});
+  EXPECT_EQ(study.simulated_trials, 10000000U);
+  EXPECT_TRUE(study.disagreement.empty()) << study.disagreement;
+}
+
 TEST(MeshStudy, SaysOnlyWhatWasFound) {
   const std::vector<double> start{0};
   const auto text = [&](const BatchMap& map) {
