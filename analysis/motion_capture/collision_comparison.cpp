@@ -56,7 +56,7 @@ CollisionComparison compare_collisions(const Experiment& known, const std::vecto
       peaks.add(c.peak - truth[i].omega_minus);
       if (!c.fit) continue;
       before.add(c.fit->omega_minus - truth[i].omega_minus);
-      if (truth[i].omega_plus) after.add(c.fit->omega_plus - *truth[i].omega_plus);
+      if (truth[i].omega_plus && c.mended_rad_s == 0) after.add(c.fit->omega_plus - *truth[i].omega_plus);
     }
   }
   result.written = written.result();

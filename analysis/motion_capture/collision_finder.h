@@ -37,6 +37,10 @@ struct FoundCollision {
   double stray_rad = 0;
   /// The fit's residual sd where it is more than the noise of the angle [rad]: the speeds are less exact; 0 elsewhere.
   double rough_rad = 0;
+  bool flies = false;  ///< the fit's motion behind the collision is a flight
+  /// How far the fit's omega_minus lay off the speed that the time since the collision before tells [rad/s]; that speed
+  /// stands in its place then, and omega_plus of the fit tells nothing. 0 elsewhere.
+  double mended_rad_s = 0;
 };
 
 /// Returns what a collisions.csv says of it: the fit, or the peak where there is no fit or `peak` is wanted.
@@ -52,7 +56,8 @@ struct FoundTrial {
 /// Differentiates with a third-degree Savitzky-Golay filter, takes all peaks that rise by `rise` (or six sds of the
 /// noise's own speed) above both sides, finds the raster of leg angles on which their falls lie, and takes on each of
 /// its angles the fastest peak for the collision; others are bounces. Where the wheel turns on past such an angle and
-/// no peak shows, the collision is sought by the fit. Fits that lie off the raster are made anew beside it.
+/// no peak shows, the collision is sought by the fit. Fits that lie off the raster are made anew beside it. Where a
+/// fitted speed and the time of the stance before it are not of one motion, the time counts.
 /// @param map  wheel and slope, for the stance motion; the contact law matters only through its inertia
 /// @param first_landing_leg  that lands at collision 1
 /// @throws std::invalid_argument for rates outside 60..1000 Hz or fewer samples than the window; options out of range;

@@ -54,15 +54,15 @@ Files write_files(const analysis::Experiment& experiment, const std::vector<anal
     const dynamics::WheelMap& map = maps[angles[t].condition];
     double position = 0;  // chord by chord
     for (const FoundCollision& c : found[t].collisions) {
+      const std::string plus = c.fit && c.mended_rad_s == 0 ? fmt::format("{:.6g}", c.fit->omega_plus) : "";
       const std::string key = fmt::format("{},{},{}", csv_field(condition.id), angles[t].number, c.number);
       const int leg = (condition.first_landing_leg + c.number - 1) % experiment.legs();
       fmt::format_to(std::back_inserter(files.collisions), "{},{},{:.6f},{:.6f},{:.6g},{}\n", key, leg,
-                     reported_time(c), position, reported_speed(c, peak),
-                     c.fit ? fmt::format("{:.6g}", c.fit->omega_plus) : "");
+                     reported_time(c), position, reported_speed(c, peak), plus);
       position += map.advance(leg % map.phases());
-      const std::string fit = c.fit ? fmt::format("{:.6f},{:.6g},{:.6g},{:.3g}", c.fit->time, c.fit->omega_minus,
-                                                  c.fit->omega_plus, c.fit->residual_sd_rad)
-                                    : ",,,";
+      const std::string fit =
+          c.fit ? fmt::format("{:.6f},{:.6g},{},{:.3g}", c.fit->time, c.fit->omega_minus, plus, c.fit->residual_sd_rad)
+                : ",,,";
       fmt::format_to(std::back_inserter(files.details), "{},{:.6f},{:.6g},{},{:.6f},{:.6g},{}\n", key, c.peak_time,
                      c.peak, fit, c.apex_time, c.apex, c.bounces);
     }
@@ -104,14 +104,16 @@ void check_speeds(const analysis::Experiment& experiment, const std::vector<anal
 
 // Says which fitted speeds are less exact than the others, and why.
 void say_fits(Answer& answer, const std::vector<FoundTrial>& found) {
-  std::size_t less_one = 0, rough = 0, vague = 0;
-  double most_stray = 0, roughest = 0, vaguest = 0;
+  std::size_t less_one = 0, rough = 0, vague = 0, mended = 0;
+  double most_stray = 0, roughest = 0, vaguest = 0, wildest = 0;
   for (const FoundTrial& trial : found)
     for (const FoundCollision& c : trial.collisions) {
       less_one += c.stray_rad > 0;
       most_stray = std::max(most_stray, c.stray_rad);
       rough += c.rough_rad > 0;
-      if (c.fit && c.fit->omega_minus_se > vague_from) {
+      mended += c.mended_rad_s > 0;
+      wildest = std::max(wildest, c.mended_rad_s);
+      if (c.fit && c.mended_rad_s == 0 && c.fit->omega_minus_se > vague_from) {
         ++vague;
         vaguest = std::max(vaguest, c.fit->omega_minus_se);
       }
@@ -121,6 +123,12 @@ void say_fits(Answer& answer, const std::vector<FoundTrial>& found) {
     answer.say(
         "{} collisions are fitted without one frame, which lies off the motion of the others by up to {:.2g} rad",
         less_one, most_stray);
+  if (mended > 0)
+    answer.say(
+        "{} collisions have omega_minus from the time since the collision before, off which the fit lies by up to "
+        "{:.2g} "
+        "rad/s, as noise and frames that are off make it; their omega_plus is left out",
+        mended, wildest);
   if (vague > 0)
     answer.say(
         "the noise of the angle leaves omega_minus of {} collisions open by more than {} rad/s (standard error, up to "
