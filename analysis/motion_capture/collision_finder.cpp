@@ -39,9 +39,9 @@ constexpr std::size_t fewest_less_one = 8, most_left_out = 6;  // frames of such
 constexpr double noise_error = 1.7;                            // ratio by which the noise's square is known
 constexpr double noise_level = 0.99;                           // share of fits to noise alone that pass for it
 
-// A fitted speed that is so far from what the time of the stance tells [rad/s] is none. Of 15000 collisions filmed at 60
-// to 1000 Hz the two are 0.03 apart at most with noise of 0.2 mrad; with 5 mrad 99 % are 0.27 apart or less, and what
-// lies beyond 0.4 are fits that are off by as much (measured: 2 of 24 were not).
+// A fitted speed that is so far from what the time of the stance tells [rad/s] is none. Of 15000 collisions filmed at
+// 60 to 1000 Hz the two are 0.03 apart at most with noise of 0.2 mrad; with 5 mrad 99 % are 0.27 apart or less, and
+// what lies beyond 0.4 are fits that are off by as much (measured: 2 of 24 were not).
 constexpr double wild_from = 0.4;
 constexpr double most_speed = 1000;  // where it is sought [rad/s]
 

@@ -71,10 +71,23 @@ WheelCandidate initial_speed(const WheelDesign& design) {
   return c;
 }
 
+// Returns by how much every leg may change [m] so that each lands whatever the others do (dynamics::Wheel).
+double most_leg_change(const std::vector<double>& stated) {
+  constexpr double largest = 0.02, clear = 0.99;
+  double most = largest;
+  const double cosine = std::cos(2 * std::numbers::pi / static_cast<double>(stated.size()));
+  for (std::size_t i = 0; i < stated.size(); ++i) {
+    const auto [shorter, longer] = std::minmax(stated[i], stated[(i + 1) % stated.size()]);
+    most = std::min({most, clear * (shorter - longer * cosine) / (1 + cosine), clear * shorter});
+  }
+  return most;
+}
+
 WheelCandidate leg_lengths(const WheelDesign& design) {
   WheelCandidate c;
   c.candidate.id = "leg_lengths";
-  FreeParameter change{0, -0.02, 0.02, 1e-6};
+  const double most = most_leg_change(design.leg_lengths);
+  FreeParameter change{0, -most, most, 1e-6};
   change.prior_sd = 0.002;  // of each: whoever stated the lengths had a ruler
   c.candidate.parameters.assign(design.leg_lengths.size(), change);
   c.candidate.report = [stated = design.leg_lengths](const Values&, const Values& v) {
