@@ -114,13 +114,14 @@ def main():
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--program", default="build/release/reports/metastable")
     parser.add_argument("--seeds", type=int, default=20)
+    parser.add_argument("--first-seed", type=int, default=1)
     parser.add_argument("--laws", default="published,coulomb,plastic,settled")
     parser.add_argument("--spreads", default="0.1,0.05")
     parser.add_argument("--trials", default="20,60")
     parser.add_argument("--few", action="store_true", help="over trials and collisions, few of them")
     parser.add_argument("--threads", type=int, default=1)
     given = parser.parse_args()
-    seeds = range(1, given.seeds + 1)
+    seeds = range(given.first_seed, given.first_seed + given.seeds)
     if given.few:
         kinds = {"as simulated": None, "coarse": coarsely_measured, "misstated": misstated}
         jobs = [((kind, trials, collisions),
