@@ -11,6 +11,7 @@
 #include "analysis/blind/sized_effect.h"
 #include "analysis/experiment/experiment.h"
 #include "tests/analysis/blind/power_design.h"
+#include "tests/message_of.h"
 
 namespace metastable::analysis::test {
 namespace {
@@ -90,12 +91,7 @@ TEST(BlindCases, ARigidBodysCaseIsReadUnderItsLaw) {
 }
 
 TEST(BlindCases, APlanOfFewerThanNoCasesIsRefused) {
-  try {
-    blind_plan({.pairs = -1}, 1);
-    ADD_FAILURE();
-  } catch (const std::invalid_argument& error) {
-    EXPECT_STREQ(error.what(), "pairs: -1 is below 0");
-  }
+  EXPECT_EQ(message_of([&] { blind_plan({.pairs = -1}, 1); }), "pairs: -1 is below 0");
 }
 
 // An effect that cannot be drawn would be counted as one that nobody finds.

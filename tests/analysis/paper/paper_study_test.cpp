@@ -10,6 +10,7 @@
 #include "analysis/experiment/experiment.h"
 #include "analysis/paper/paper_claims.h"
 #include "tests/analysis/folders.h"
+#include "tests/message_of.h"
 
 namespace metastable::analysis {
 namespace {
@@ -28,15 +29,9 @@ TEST(PaperStudy, TakesItsExperimentsFromAFolder) {
   EXPECT_NEAR(read.fast_702[7].back(), made.fast_702[7].back(), 1e-7);
   Experiment one = folder;
   std::erase_if(one.trials, [](const MeasuredTrial& t) { return t.condition == 1; });
-  try {
-    paper_experiments(one);
-    FAIL();
-  } catch (const std::invalid_argument& error) {
-    EXPECT_STREQ(
-        error.what(),
-        "study: the experiment has 1 conditions with trials within 0.5 deg of 9.59 deg and 1 of 7.02 deg (2 and "
-        "1 are needed)");
-  }
+  EXPECT_EQ(message_of([&] { paper_experiments(one); }),
+            "study: the experiment has 1 conditions with trials within 0.5 deg of 9.59 deg and 1 of 7.02 deg (2 and "
+            "1 are needed)");
 }
 
 TEST(PaperStudy, ReadingsAndLawsDiffer) {

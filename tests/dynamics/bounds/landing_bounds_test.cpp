@@ -9,6 +9,7 @@
 #include <random>
 
 #include "dynamics/return_map/rest_probability.h"
+#include "tests/message_of.h"
 
 namespace metastable::dynamics {
 namespace {
@@ -29,12 +30,7 @@ WheelMap map(double slope_deg, double mean, double sd, bool equal = true) {
 }
 
 std::string refusal(const WheelMap& refused) {
-  try {
-    const LandingBounds bounds(refused, 0, 17, 90, coarse, in_order);
-  } catch (const NoBounds& none) {
-    return none.what();
-  }
-  return "";
+  return message_of<NoBounds>([&] { const LandingBounds bounds(refused, 0, 17, 90, coarse, in_order); });
 }
 
 TEST(LandingBounds, HoldTheQuadratureOfRest) {

@@ -11,6 +11,7 @@
 
 #include "markov/mesh/mesh_study.h"
 #include "tests/markov/mesh/maps.h"
+#include "tests/message_of.h"
 
 namespace metastable::markov {
 namespace {
@@ -69,18 +70,16 @@ TEST(JoinedSteps, ShareCallsThatDoNotHangOnThreads) {
 
 TEST(JoinedSteps, ThrowWhatTheFirstWorkThrew) {
   const BatchMap map = linear_batch(0.3);
-  try {
-    joined_for(map, 5, 5, 2, [&](std::size_t i, const BatchMap& joined) {
-      std::vector<double> state{2.0}, next(1);
-      std::vector<std::uint8_t> failed(1);
-      joined.step(0, state, std::vector<double>{0.0}, next, failed);
-      if (i == 3) throw std::runtime_error("the third");
-      for (;;) joined.step(0, state, std::vector<double>{0.0}, next, failed);
-    });
-    FAIL();
-  } catch (const std::runtime_error& error) {
-    EXPECT_STREQ(error.what(), "the third");
-  }
+  EXPECT_EQ(message_of<std::runtime_error>([&] {
+              joined_for(map, 5, 5, 2, [&](std::size_t i, const BatchMap& joined) {
+                std::vector<double> state{2.0}, next(1);
+                std::vector<std::uint8_t> failed(1);
+                joined.step(0, state, std::vector<double>{0.0}, next, failed);
+                if (i == 3) throw std::runtime_error("the third");
+                for (;;) joined.step(0, state, std::vector<double>{0.0}, next, failed);
+              });
+            }),
+            "the third");
   BatchMap broken = map;
   broken.step = [](int, auto, auto, auto, auto) { throw std::logic_error("the step"); };
   EXPECT_THROW(ends(broken, 4, 2), std::logic_error);

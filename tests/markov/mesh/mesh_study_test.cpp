@@ -7,6 +7,7 @@
 
 #include "markov/mesh/batch_simulation.h"
 #include "tests/markov/mesh/maps.h"
+#include "tests/message_of.h"
 
 namespace metastable::markov {
 namespace {
@@ -153,12 +154,7 @@ TEST(MeshStudy, SimulatesTenMillionTrialsAtMost) {
 TEST(MeshStudy, SaysOnlyWhatWasFound) {
   const std::vector<double> start{0};
   const auto text = [&](const BatchMap& map) {
-    try {
-      mesh_study(map, start, quick());
-    } catch (const std::exception& error) {
-      return std::string(error.what());
-    }
-    return std::string();
+    return message_of<std::exception>([&] { mesh_study(map, start, quick()); });
   };
   const std::string at_once = text(damped_batch([](double, double, double) { return true; }));
   EXPECT_NE(at_once.find("even without noise it fails"), std::string::npos) << at_once;

@@ -11,6 +11,7 @@
 #include "markov/chain/solver.h"
 #include "markov/passage/quasi_stationary.h"
 #include "markov/transition_rows/chain_pool.h"
+#include "tests/message_of.h"
 
 namespace metastable::markov {
 namespace {
@@ -231,12 +232,9 @@ TEST(Discretization, LandingThatIsNoNumberIsAnErrorNamingTheState) {
   MapWithAHole map;
   map.b = 20;
   const auto message = [&](double launched) -> std::string {
-    try {
+    return message_of<std::domain_error>([&] {
       discretize(map, StateSpace({Grid::uniform(0, 60, 200)}), {[=](double) { return launched; }, 0}, {});
-    } catch (const std::domain_error& error) {
-      return error.what();
-    }
-    return "";
+    });
   };
   EXPECT_NE(message(40).find("return map: the landing from state 3.0"), std::string::npos) << message(40);
 }

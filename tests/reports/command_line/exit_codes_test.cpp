@@ -11,18 +11,12 @@
 #include <thread>
 
 #include "tests/reports/program.h"
-#include "tests/reports/support.h"
 
 namespace metastable::reports::test {
 namespace {
 
 class ExitCodes : public InFolder {
  protected:
-  const std::vector<std::string> quick_{"--legs", "0.1519", "--cells", "32", "--samples", "256", "--replicates", "2"};
-  std::vector<std::string> quick(std::vector<std::string> words) const {
-    words.insert(words.end(), quick_.begin(), quick_.end());
-    return words;
-  }
   std::string pipe(const std::string& name) const {
     ::mkfifo(path(name).c_str(), 0600);
     return path(name);
@@ -42,8 +36,8 @@ TEST_F(ExitCodes, FullDeviceIsTwoAndALine) {
   EXPECT_EXIT(run_into_full_device({"steps", "--help"}), testing::ExitedWithCode(2), full);
   EXPECT_EXIT(run_into_full_device({"effects"}), testing::ExitedWithCode(2), full);
   EXPECT_EXIT(run_into_full_device({"effects", "--json", "-"}), testing::ExitedWithCode(2), full);
-  EXPECT_EXIT(run_into_full_device(quick({"steps"})), testing::ExitedWithCode(2), full);
-  EXPECT_EXIT(run_into_full_device(quick({"compare"})), testing::ExitedWithCode(2), full);
+  EXPECT_EXIT(run_into_full_device(with({"steps"}, quick)), testing::ExitedWithCode(2), full);
+  EXPECT_EXIT(run_into_full_device(with({"compare"}, quick)), testing::ExitedWithCode(2), full);
   EXPECT_EXIT(run_into_full_device({"simulate", "--trials", "3", "--out", path("made")}), testing::ExitedWithCode(2),
               full);
   // A file does likewise.
@@ -53,7 +47,7 @@ TEST_F(ExitCodes, FullDeviceIsTwoAndALine) {
 }
 
 TEST_F(ExitCodes, FullDeviceIsNoPlaceForASweep) {
-  const Ran ran = metastable(quick({"sweep", "--friction-mean", "0.3,0.4", "--out", "/dev/full"}));
+  const Ran ran = metastable(with({"sweep", "--friction-mean", "0.3,0.4", "--out", "/dev/full"}, quick));
   EXPECT_EQ(ran.code, 2);
   EXPECT_EQ(ran.err,
             "metastable: cannot write /dev/full: is no regular file, from which a sweep could be taken up again\n");
@@ -80,8 +74,8 @@ TEST_F(ExitCodes, PipesThatNobodyWritesToOrReadsEndAtASignal) {
 
 // A limit ends the wait with a sentence, and changes no number where it is not reached.
 TEST_F(ExitCodes, TimeLimitIsThreeAndASentence) {
-  for (const std::vector<std::string>& words : {quick({"steps"}),
-                                                quick({"steps", "--law", "coulomb"}),
+  for (const std::vector<std::string>& words : {with({"steps"}, quick),
+                                                with({"steps", "--law", "coulomb"}, quick),
                                                 {"steps", "--walker", "simplest", "--slope-sd", "0.1"}}) {
     std::vector<std::string> limited = words;
     limited.insert(limited.end(), {"--time-limit", "1e-9", "--json", path("none.json")});
@@ -92,8 +86,8 @@ TEST_F(ExitCodes, TimeLimitIsThreeAndASentence) {
     EXPECT_FALSE(std::filesystem::exists(path("none.json")));
   }
   EXPECT_EQ(metastable({"steps", "--time-limit", "0"}).code, 2);
-  ASSERT_EQ(metastable(quick({"steps", "--time-limit", "1e8", "--json", path("with.json")})).code, 0);
-  ASSERT_EQ(metastable(quick({"steps", "--json", path("without.json")})).code, 0);
+  ASSERT_EQ(metastable(with({"steps", "--time-limit", "1e8", "--json", path("with.json")}, quick)).code, 0);
+  ASSERT_EQ(metastable(with({"steps", "--json", path("without.json")}, quick)).code, 0);
   EXPECT_EQ(read(path("with.json")), read(path("without.json")));
 }
 
@@ -128,7 +122,7 @@ TEST_F(ExitCodes, DevicesAreNotRead) {
 TEST_F(ExitCodes, MissingGnuplotIsThree) {
   const auto without_programs = [&] {
     ::setenv("PATH", path("empty").c_str(), 1);
-    ::_exit(run(quick({"sweep", "--friction-mean", "0.3,0.4", "--out", path("s.csv")})));
+    ::_exit(run(with({"sweep", "--friction-mean", "0.3,0.4", "--out", path("s.csv")}, quick)));
   };
   EXPECT_EXIT(without_programs(), testing::ExitedWithCode(3), "gnuplot, which draws the figures, was not found");
 }

@@ -8,6 +8,7 @@
 #include <string>
 
 #include "dynamics/catalogue/effect_catalogue.h"
+#include "tests/message_of.h"
 
 namespace metastable::reports {
 namespace {
@@ -24,43 +25,30 @@ TEST(OptionValues, ACatalogueTakesPairsAndTellsAMissingFileFromAnUnknownEffect) 
   EXPECT_EQ(catalogue_value("catalogue", "bounce, trial_drift+bounce"),
             (std::vector<std::string>{"bounce", "trial_drift+bounce"}));
   const auto message = [](const std::string& text) -> std::string {
-    try {
-      catalogue_value("catalogue", text);
-    } catch (const std::invalid_argument& error) {
-      return error.what();
-    }
-    return "";
+    return message_of([&] { catalogue_value("catalogue", text); });
   };
   EXPECT_EQ(message("list.txt"), "--catalogue: list.txt: no such file, nor a list of effects");
   EXPECT_EQ(message("bounce+air_drag+inertia"), "--catalogue: \"bounce+air_drag+inertia\" has more than two effects");
   EXPECT_NE(message("bounce+wind").find("'wind' is none of"), std::string::npos);
 }
 
-std::string refusal(const std::function<void()>& read) {
-  try {
-    read();
-  } catch (const std::invalid_argument& error) {
-    return error.what();
-  }
-  return "";
-}
-
 TEST(OptionValues, ANumberOutOfRangeIsToldTheRangeAndATextThatItIsNone) {
   const auto whole = [](const std::string& text) {
-    return refusal([&] { whole_value("samples", text, 16, 1u << 24); });
+    return message_of([&] { whole_value("samples", text, 16, 1u << 24); });
   };
-  for (const std::string text : {"16", "+16", " 99 ", "16777216", "1e6", "100.0"}) EXPECT_EQ(whole(text), "") << text;
+  for (const std::string text : {"16", "+16", " 99 ", "16777216", "1e6", "100.0"})
+    EXPECT_EQ(whole(text), "nothing was thrown") << text;
   EXPECT_EQ(whole_value("samples", "1e6", 16, 1u << 24), 1000000u);
   for (const std::string text : {"3", "-3", "0", "15", "16777217", "1e300", "99999999999999999999", "inf"})
     EXPECT_EQ(whole(text), "--samples: " + text + " is outside 16..16777216");
   for (const std::string text : {"x", "", "2.5", "3,5", "nan", "0x10", "16 17", "--json"})
     EXPECT_EQ(whole(text), "--samples: '" + text + "' is not a whole number in 16..16777216");
   EXPECT_EQ(whole_value("seed", "18446744073709551615", 0, UINT64_MAX), UINT64_MAX);
-  EXPECT_EQ(refusal([] { whole_value("seed", "18446744073709551616", 0, UINT64_MAX); }),
+  EXPECT_EQ(message_of([] { whole_value("seed", "18446744073709551616", 0, UINT64_MAX); }),
             "--seed: 18446744073709551616 is outside 0..18446744073709551615");
 
   const auto number = [](const std::string& text) {
-    return refusal([&] { number_value("mass", text, {.low = 1, .high = 2}); });
+    return message_of([&] { number_value("mass", text, {.low = 1, .high = 2}); });
   };
   EXPECT_EQ(number("1e999"), "--mass: inf is outside [1, 2]");
   EXPECT_EQ(number("-1e999"), "--mass: -inf is outside [1, 2]");
@@ -68,7 +56,7 @@ TEST(OptionValues, ANumberOutOfRangeIsToldTheRangeAndATextThatItIsNone) {
   EXPECT_EQ(number("2.5"), "--mass: 2.5 is outside [1, 2]");
   EXPECT_EQ(number("nan"), "--mass: 'nan' is not a number");
   EXPECT_EQ(number("1.5 kg"), "--mass: '1.5 kg' is not a number");
-  EXPECT_EQ(refusal([] { spread_value("friction", "0.4,1e999", {.low = 0, .high = 10}); }),
+  EXPECT_EQ(message_of([] { spread_value("friction", "0.4,1e999", {.low = 0, .high = 10}); }),
             "--friction: sd inf is outside [0, 10]");
 }
 

@@ -9,27 +9,18 @@
 #include <vector>
 
 #include "tests/reports/program.h"
-#include "tests/reports/support.h"
 
 namespace metastable::reports::test {
 namespace {
 
-struct Case {
-  std::vector<std::string> words;
-  std::string said;
-};
-
-void expect_refused(const std::vector<Case>& cases) {
-  for (const Case& one : cases) {
-    SCOPED_TRACE(fmt::format("{}", fmt::join(one.words, " ")));
-    const Ran ran = metastable(one.words);
-    EXPECT_EQ(ran.code, 2);
-    EXPECT_EQ(ran.out, "");
-    EXPECT_EQ(ran.err, "metastable: " + one.said + "\n");
+class Refusals : public CommandLine {
+ protected:
+  // Each names the whole line.
+  void expect_refused(std::vector<Refused> all) const {
+    for (Refused& one : all) one.named = "metastable: " + one.named + "\n";
+    CommandLine::expect_refused(all);
   }
-}
-
-using Refusals = InFolder;
+};
 
 TEST_F(Refusals, OfWheelsThatSettledDoesNotHold) {
   const auto steps = [](std::vector<std::string> more) {
@@ -177,6 +168,7 @@ TEST_F(Refusals, OfWrongWordsHintAtTheNearest) {
       {{"steps", "--walker", "compas", "--slope-sd", "1"},
        "--walker: 'compas' is none of simplest, compass; did you mean 'compass'?"},
       {{"blind", "opne", "run"}, "ACTION: 'opne' is none of make, answer, open; did you mean 'open'?"},
+      {{"blind", "shut", "run"}, "ACTION: 'shut' is none of make, answer, open"},
       {{"completion", "fihs"}, "SHELL: 'fihs' is none of bash, zsh, fish; did you mean 'fish'?"},
       {{"describe", "trials", "--transition", "setp"},
        "--transition: 'setp' is none of auto, collision, step; did you mean 'step'?"},
@@ -212,7 +204,7 @@ TEST_F(Refusals, AreAnnouncedInTheHelp) {
 
 // The ends of the ranges are answers. The curve of survival does not grow with the ramp.
 TEST_F(Refusals, DoNotReachTheEndsOfTheRanges) {
-  const std::vector<std::string> quick{"--cells", "32", "--samples", "256", "--replicates", "2", "--json"};
+  const std::vector<std::string> coarse{"--cells", "32", "--samples", "256", "--replicates", "2", "--json"};
   int number = 0;
   for (std::vector<std::string> words :
        std::vector<std::vector<std::string>>{{"--ramp-length", "100000"},
@@ -226,7 +218,7 @@ TEST_F(Refusals, DoNotReachTheEndsOfTheRanges) {
                                              {"--gravity", "1000", "--initial-speed", "70,1"}}) {
     SCOPED_TRACE(fmt::format("{}", fmt::join(words, " ")));
     words.insert(words.begin(), "steps");
-    words.insert(words.end(), quick.begin(), quick.end());
+    words.insert(words.end(), coarse.begin(), coarse.end());
     words.push_back(path(fmt::format("{}.json", number++)));
     const Ran ran = metastable(words);
     EXPECT_EQ(ran.code, 0) << ran.err;

@@ -53,26 +53,20 @@ TEST_F(CompareCommand, TakesSeveralValuesOfAnyParameter) {
   EXPECT_EQ(labels({"--law", "published,coulomb", "--rebound-lost", "0,0.5"}).size(), 3u);  // published has one
 }
 
-TEST_F(CompareCommand, AndSweepSayWhatRigidBodiesGive) {
+TEST_F(CompareCommand, SaysWhatRigidBodiesGive) {
   const Ran compared = metastable(with({"compare"}, quick));
   EXPECT_NE(compared.out.find("The law is published, as none was named; rigid bodies (law settled)"), std::string::npos)
       << compared.out;
   EXPECT_EQ(metastable(with({"compare", "--law", "published"}, quick)).out.find("rigid bodies"), std::string::npos);
+}
 
-  const std::vector<std::string> rubber = with({"sweep", "--slope", "9.59", "--friction-mean", "0.4,0.5,0.6"}, quick);
-  const Ran swept = metastable(with(rubber, {"--out", path("s.csv")}));
-  ASSERT_EQ(swept.code, 0) << swept.err;
-  EXPECT_NE(swept.out.find("disagree in direction"), std::string::npos) << swept.out;
-  const std::string whole = read(path("s.csv"));
-  EXPECT_NE(whole.find(",status,rigid_bodies_steps,rigid_bodies_steps_low95,rigid_bodies_steps_high95\n"),
-            std::string::npos);
-  EXPECT_NE(read(path("s.svg")).find("law settled"), std::string::npos);
-  EXPECT_NE(read(path("s.svg")).find("law published"), std::string::npos);
-  // Points taken over from the file are in the line as well.
-  const Ran again = metastable(with(rubber, {"--out", path("s.csv")}));
-  EXPECT_EQ(again.out.substr(again.out.find('\n')), swept.out.substr(swept.out.find('\n')));
-  ASSERT_EQ(metastable(with(rubber, {"--law", "published", "--out", path("n.csv")})).code, 0);
-  EXPECT_EQ(read(path("n.csv")).find("rigid"), std::string::npos);
+TEST_F(CompareCommand, StandardErrorsWidenTheRatio) {
+  const Ran ran = metastable(with({"compare", "--slope-se", "0.1", "--json", "-"}, quick));
+  ASSERT_EQ(ran.code, 0) << ran.err;
+  const auto json = nlohmann::json::parse(ran.out);
+  EXPECT_TRUE(json["settings"][1].contains("from_standard_errors"));
+  EXPECT_LT(json["contrasts"][0]["ratio_from_standard_errors"]["interval_95"][0],
+            json["contrasts"][0]["ratio"]["value"]);
 }
 
 // A wrong option, key or value gives exit code 2 and one line that names it and what is allowed.

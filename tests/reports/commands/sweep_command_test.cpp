@@ -20,8 +20,7 @@ namespace {
 class SweepCommand : public CommandLine {
  protected:
   Ran sweep(const std::string& out, const std::string& values = "0.3,0.4") const {
-    return metastable({"sweep", "--friction-mean", values, "--legs", "0.1519", "--cells", "32", "--samples", "256",
-                       "--replicates", "2", "--out", out});
+    return metastable(with({"sweep", "--friction-mean", values, "--out", out}, quick));
   }
 };
 
@@ -119,6 +118,30 @@ TEST_F(SweepCommand, CutShortByASignalSaysWhatItKept) {
   EXPECT_NE(head.find("mu ~ N(varies, varies^2)"), std::string::npos) << head;
   EXPECT_NE(head.find("7.02 deg"), std::string::npos) << head;
   EXPECT_EQ(whole.find("N(0.4, 0.1^2), omega"), std::string::npos) << whole;
+}
+
+TEST_F(SweepCommand, SaysWhatRigidBodiesGive) {
+  const std::vector<std::string> rubber = with({"sweep", "--slope", "9.59", "--friction-mean", "0.4,0.5,0.6"}, quick);
+  const Ran swept = metastable(with(rubber, {"--out", path("s.csv")}));
+  ASSERT_EQ(swept.code, 0) << swept.err;
+  EXPECT_NE(swept.out.find("disagree in direction"), std::string::npos) << swept.out;
+  const std::string whole = read(path("s.csv"));
+  EXPECT_NE(whole.find(",status,rigid_bodies_steps,rigid_bodies_steps_low95,rigid_bodies_steps_high95\n"),
+            std::string::npos);
+  EXPECT_NE(read(path("s.svg")).find("law settled"), std::string::npos);
+  EXPECT_NE(read(path("s.svg")).find("law published"), std::string::npos);
+  // Points taken over from the file are in the line as well.
+  const Ran again = metastable(with(rubber, {"--out", path("s.csv")}));
+  EXPECT_EQ(again.out.substr(again.out.find('\n')), swept.out.substr(swept.out.find('\n')));
+  ASSERT_EQ(metastable(with(rubber, {"--law", "published", "--out", path("n.csv")})).code, 0);
+  EXPECT_EQ(read(path("n.csv")).find("rigid"), std::string::npos);
+}
+
+TEST_F(SweepCommand, LaunchesAreSteadyWhereThePaperHasNone) {
+  const Ran ran = metastable(with(
+      {"sweep", "--law", "published", "--slope", "0.1,7,8", "--friction-sd", "0.02", "--out", path("s.csv")}, quick));
+  ASSERT_EQ(ran.code, 0) << ran.err;
+  EXPECT_NE(read(path("s.csv")).find("0.1,0.02,,,,,,,,,no_regime\n"), std::string::npos) << read(path("s.csv"));
 }
 
 // A wrong option, key or value gives exit code 2 and one line that names it and what is allowed.

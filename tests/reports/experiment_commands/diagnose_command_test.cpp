@@ -103,7 +103,6 @@ TEST_F(DiagnoseCommand, NamesTheKnownEffects) {
 TEST_F(DiagnoseCommand, WrongInputIsOneLineAndCodeTwo) {
   expect_refused({
       {{"diagnose"}, "DIR"},
-      {{"diagnose", path("none")}, "none: there is no such folder"},
       {{"diagnose", path("none"), "--catalogue", "leg_contact,lag_contact"}, "--catalogue: "},
       {{"diagnose", path("none"), "--catalogue", file("ids.csv", "leg_contact\n# more\nlag_contact\n")}, "ids.csv:3: "},
   });

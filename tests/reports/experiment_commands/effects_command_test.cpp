@@ -21,12 +21,5 @@ TEST_F(EffectsCommand, ListsTheCatalogue) {
   EXPECT_EQ(nlohmann::json::parse(read(path("effects.json"))).at("schema"), 1);
 }
 
-// A wrong option, key or value gives exit code 2 and one line that names it and what is allowed.
-TEST_F(EffectsCommand, WrongInputIsOneLineAndCodeTwo) {
-  expect_refused({
-      {{"effects", "--json", path("no/such/folder/x.json")}, "no/such/folder"},
-  });
-}
-
 }  // namespace
 }  // namespace metastable::reports::test

@@ -26,6 +26,13 @@ TEST_F(SimulateCommand, WritesAnExperimentOnce) {
   EXPECT_NE(again.err.find("already holds"), std::string::npos);
 }
 
+TEST_F(SimulateCommand, LaunchesAreSteadyWhereThePaperHasNone) {
+  const Ran ran = metastable({"simulate", "--slope", "8", "--legs", "0.1519", "--trials", "3", "--out", path("t")});
+  ASSERT_EQ(ran.code, 0) << ran.err;
+  EXPECT_NE(read(path("t/experiment.toml")).find("initial_speed_rad_s = { mean = 4."), std::string::npos)
+      << read(path("t/experiment.toml"));
+}
+
 // What it understands gives the same trials on one thread and on two.
 TEST_F(SimulateCommand, RealityLeavesNothingBehindWhenItIsMisunderstood) {
   const auto refused = [&](std::vector<std::string> words) {

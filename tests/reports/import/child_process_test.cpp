@@ -8,16 +8,13 @@
 #include <stdexcept>
 #include <string>
 
+#include "tests/message_of.h"
+
 namespace metastable::reports {
 namespace {
 
 std::string refusal(const std::function<std::string()>& work) {
-  try {
-    in_child_process(work, "the work died");
-  } catch (const std::invalid_argument& error) {
-    return error.what();
-  }
-  return "";
+  return message_of([&] { in_child_process(work, "the work died"); });
 }
 
 TEST(ChildProcess, HandsOverWhatItFinds) {

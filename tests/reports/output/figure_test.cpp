@@ -13,6 +13,7 @@
 #include <vector>
 
 #include "reports/output/interrupt.h"
+#include "tests/message_of.h"
 
 namespace metastable::reports {
 namespace {
@@ -43,12 +44,7 @@ std::size_t count(const std::string& text, const std::string& part) {
 }
 
 std::string error_of(const Figure& figure) {
-  try {
-    gnuplot_script(figure);
-  } catch (const std::invalid_argument& error) {
-    return error.what();
-  }
-  return "no error";
+  return message_of([&] { gnuplot_script(figure); });
 }
 
 TEST(Figure, SvgIsWholeAndCarriesTitleAndProvenance) {
@@ -176,12 +172,7 @@ TEST(Figure, BadDataIsNamed) {
 TEST(Figure, MissingGnuplotIsSaid) {
   const std::string path = std::getenv("PATH");
   setenv("PATH", "/nonexistent", 1);
-  std::string message;
-  try {
-    render_svg(sample_figure());
-  } catch (const std::runtime_error& error) {
-    message = error.what();
-  }
+  const std::string message = message_of<std::runtime_error>([&] { render_svg(sample_figure()); });
   setenv("PATH", path.c_str(), 1);
   EXPECT_EQ(message, "gnuplot, which draws the figures, was not found: install the package gnuplot-nox");
 }
@@ -222,12 +213,8 @@ class HangingGnuplot : public ::testing::Test {
 };
 
 TEST_F(HangingGnuplot, IsEndedAtTheLimit) {
-  std::string message;
-  try {
-    render_svg(sample_figure(), std::chrono::milliseconds(300));
-  } catch (const std::runtime_error& error) {
-    message = error.what();
-  }
+  const std::string message =
+      message_of<std::runtime_error>([&] { render_svg(sample_figure(), std::chrono::milliseconds(300)); });
   EXPECT_EQ(message, "figure 'map' was not drawn: gnuplot did not end within 0.3 s and was ended");
   EXPECT_TRUE(all_ended());
 }

@@ -8,6 +8,7 @@
 #include <iterator>
 #include <string>
 
+#include "tests/message_of.h"
 #include "tests/reports/support.h"
 
 namespace metastable::reports {
@@ -102,12 +103,7 @@ TEST_F(OutputFileTest, DashIsStandardOutput) {
 
 TEST_F(OutputFileTest, ErrorsNamePathAndReason) {
   const auto message = [](const fs::path& path) -> std::string {
-    try {
-      write_file(path, "x");
-    } catch (const OutputError& error) {
-      return error.what();
-    }
-    return "no error";
+    return message_of<OutputError>([&] { write_file(path, "x"); });
   };
   const fs::path missing = folder_ / "missing" / "a.csv";
   EXPECT_EQ(message(missing), "cannot write " + missing.string() + ": No such file or directory");

@@ -7,6 +7,8 @@
 #include <locale>
 #include <string>
 
+#include "tests/message_of.h"
+
 namespace metastable::reports {
 namespace {
 
@@ -195,14 +197,7 @@ TEST(Table, HtmlIsEscaped) {
 }
 
 TEST(Table, RefusesNanAndRaggedRows) {
-  const auto message = [](const Table& table) -> std::string {
-    try {
-      to_markdown(table);
-    } catch (const std::invalid_argument& error) {
-      return error.what();
-    }
-    return "no error";
-  };
+  const auto message = [](const Table& table) -> std::string { return message_of([&] { to_markdown(table); }); };
   Table table{.id = "t", .title = "t", .columns = {{"x"}, {"y"}}, .rows = {{1.0, 2.0}, {1.0, nan_value}}};
   EXPECT_EQ(message(table), "table 't', row 2, column 'y': not a number (NaN)");
   table.rows = {{1.0, Estimate{1, nan_value, 2}}};
