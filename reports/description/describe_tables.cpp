@@ -8,14 +8,10 @@
 
 #include "dynamics/wheel/contact_law.h"
 #include "reports/description/speed_cells.h"
+#include "reports/output/known_cell.h"
 
 namespace metastable::reports {
 namespace {
-
-Cell cell(const analysis::Estimate& e) {
-  if (std::isinf(e.value)) return std::isinf(e.upper) ? Cell(fmt::format("> {:.4g}", e.lower)) : Cell(Infinite{});
-  return Estimate{e.value, e.lower, e.upper};
-}
 
 // Where even the best parameters make the transitions next to impossible, the number says no more than that.
 Cell log_likelihood_cell(const analysis::ContactFit& fit) {
@@ -100,7 +96,7 @@ Table conditions_table(const analysis::Description& description, const Provenanc
     row.push_back(c.line ? Cell(with_error(c.line->slope, c.line->slope_error)) : Cell(""));
     row.push_back(c.line && c.line->fixed_point ? Cell(*c.line->fixed_point) : Cell(""));
     row.push_back(c.survival ? Cell(c.survival->rests) : Cell(""));
-    row.push_back(c.survival ? cell(c.survival->expected.from_start) : Cell(""));
+    row.push_back(c.survival ? estimate_cell(c.survival->expected.from_start, 4) : Cell(""));
     table.rows.push_back(std::move(row));
   }
   table.notes = {
@@ -191,9 +187,9 @@ Table tests_table(const analysis::Description& description, const Provenance& pr
     const auto add = [&](const std::optional<analysis::SampleComparison>& s, const char* values, bool meet) {
       if (!s) return;
       table.rows.push_back({pair, values, fmt::format("{}, {}", s->count_a, s->count_b),
-                            effect_cell(s->welch.difference), p_cell(s->welch.p), p_cell(s->pooled.p),
-                            p_cell(s->kolmogorov_smirnov.p), p_cell(s->anderson_darling.p), effect_cell(s->hedges),
-                            effect_cell(s->superiority), effect_cell(s->distance),
+                            effect_cell(s->welch.difference), known_cell(s->welch.p), known_cell(s->pooled.p),
+                            known_cell(s->kolmogorov_smirnov.p), known_cell(s->anderson_darling.p),
+                            effect_cell(s->hedges), effect_cell(s->superiority), effect_cell(s->distance),
                             meet ? meet_cell(c.meet) : Cell("")});
     };
     add(c.trial_means, "trial means", true);
@@ -289,7 +285,7 @@ Table laws_table(const analysis::LawComparison& comparison, const Provenance& pr
     }
     table.rows.push_back({r.condition, r.source, r.trials, mean_cell(r.steady), sd_cell(r.steady),
                           r.steady.count > 0 ? Cell(r.collision_sd) : Cell(""),
-                          r.outcomes_known ? cell(r.rest_share) : Cell(""), p_cell(r.p_speed)});
+                          r.outcomes_known ? estimate_cell(r.rest_share) : Cell(""), known_cell(r.p_speed)});
   }
   table.notes = {
       "Steady: from the 13th collision on, by the trials that got there; empty if none did. Brackets: 95 %. P: Welch's "
@@ -326,7 +322,7 @@ Table landings_table(const std::vector<analysis::LegRow>& legs, const Provenance
   std::size_t told_apart = 0, tests = 0;
   for (const analysis::LegRow& r : legs) {
     table.rows.push_back({r.condition, r.leg, r.kept_measured.count, mean_cell(r.kept_measured), mean_cell(r.kept),
-                          p_cell(r.p_kept), in_mm(r.slide_measured), in_mm(r.slide), p_cell(r.p_slide)});
+                          known_cell(r.p_kept), in_mm(r.slide_measured), in_mm(r.slide), known_cell(r.p_slide)});
     for (const std::optional<double>& value : {r.p_kept, r.p_slide})
       if (value) ++tests, told_apart += *value < 0.05;
   }

@@ -5,6 +5,7 @@
 #include <algorithm>
 
 #include "reports/description/speed_cells.h"
+#include "reports/output/known_cell.h"
 
 namespace metastable::reports {
 namespace {
@@ -20,8 +21,6 @@ Cell steady_cell(const std::vector<double>& trial_means) {
 
 // Says whether its steady speeds can be tested.
 bool reaches_steady(const StudiedProfile& profile) { return profile.steady.size() >= 2; }
-
-Cell sd_cell(double sd) { return sd > 0 ? Cell(sd) : Cell(""); }
 
 std::string experiment_name(const analysis::PaperExperiments& experiments) {
   return experiments.stand_in ? "stand-in (simulated)" : "experiment";
@@ -271,8 +270,8 @@ Table fig4_table(const Studies& studies, const analysis::PaperExperiments& exper
     std::vector<Cell> row{source, steady_cell(analysis::steady_trial_means(fast)),
                           steady_cell(analysis::steady_trial_means(slow))};
     if (c.trial_means)
-      row.insert(row.end(), {effect_cell(c.trial_means->welch.difference), p_cell(c.trial_means->welch.p),
-                             p_cell(c.all_collisions->pooled.p)});
+      row.insert(row.end(), {effect_cell(c.trial_means->welch.difference), known_cell(c.trial_means->welch.p),
+                             known_cell(c.all_collisions->pooled.p)});
     else
       row.insert(row.end(), {"", "", ""});
     row.push_back(meet_cell(c.meet));
@@ -305,12 +304,12 @@ Table fig6_table(const Studies& studies, const Provenance& provenance) {
       std::vector<Cell> row{s.variant.name, panel.friction};
       for (const analysis::LaunchRun& run : panel.runs) row.push_back(steady_cell(run.measured_legs.trial_means));
       const StudiedProfile& fastest = panel.runs.back().measured_legs;
-      row.push_back(sd_cell(fastest.steady_sd()));
+      row.push_back(positive_cell(fastest.steady_sd()));
       for (double analysis::SteadyTest::*p : {&analysis::SteadyTest::p, &analysis::SteadyTest::p_by_trial})
         for (const analysis::LaunchPair& pair : panel.pairs) {
           const bool both = reaches_steady(panel.run(pair.first).measured_legs) &&
                             reaches_steady(panel.run(pair.second).measured_legs);
-          row.push_back(both ? p_cell(pair.alike.*p) : Cell(""));
+          row.push_back(both ? known_cell(pair.alike.*p) : Cell(""));
         }
       row.emplace_back(fastest.rest_share);
       table.rows.push_back(std::move(row));
@@ -340,8 +339,8 @@ Table equal_legs_table(const Studies& studies, const Provenance& provenance) {
       for (const auto& [launch, measured, equal, alike] : panel.runs) {
         const bool both = reaches_steady(measured) && reaches_steady(equal);
         table.rows.push_back({s.variant.name, panel.friction, launch, steady_cell(measured.trial_means),
-                              steady_cell(equal.trial_means), both ? p_cell(alike.p) : Cell(""),
-                              both ? p_cell(alike.p_by_trial) : Cell("")});
+                              steady_cell(equal.trial_means), both ? known_cell(alike.p) : Cell(""),
+                              both ? known_cell(alike.p_by_trial) : Cell("")});
       }
   table.notes = {
       "Steady speeds (from the 13th collision on) of the runs of Fig. 6. Paper: P > 0.1 everywhere. Collisions 13 to "
@@ -368,8 +367,8 @@ Table fig7_table(const Studies& studies, const analysis::PaperExperiments& exper
     for (const analysis::SpreadPanel& panel : s.fig7)
       for (const auto& [restitution_sd, profile, test] : panel.runs)
         table.rows.push_back({s.variant.name, panel.friction_sd, restitution_sd, steady_cell(profile.trial_means),
-                              sd_cell(profile.steady_sd()), profile.rest_share,
-                              test ? effect_cell(test->difference) : Cell(""), test ? p_cell(test->p) : Cell("")});
+                              positive_cell(profile.steady_sd()), profile.rest_share,
+                              test ? effect_cell(test->difference) : Cell(""), test ? known_cell(test->p) : Cell("")});
   table.notes = {
       "η ~ N(0.4, sd²), μ ~ N(0.4, sd²), launch N(7.35, 0.19²) rad/s. P: pooled t-test of all collisions from the 13th "
       "on "
@@ -424,8 +423,9 @@ Table fig9_table(const Studies& studies, const Provenance& provenance) {
   for (const VariantStudy& s : studies)
     for (const analysis::MeanPanel& panel : s.fig9)
       for (const auto& [restitution, profile] : panel.runs)
-        table.rows.push_back({s.variant.name, panel.friction, restitution, sd_cell(profile.transient_sd()),
-                              sd_cell(profile.steady_sd()), steady_cell(profile.trial_means), profile.rest_share});
+        table.rows.push_back({s.variant.name, panel.friction, restitution, positive_cell(profile.transient_sd()),
+                              positive_cell(profile.steady_sd()), steady_cell(profile.trial_means),
+                              profile.rest_share});
   table.notes = {"Launch N(7.35, 0.19²) rad/s. Sds between trials; empty where fewer than two trials get that far.",
                  variants_note};
   return table;

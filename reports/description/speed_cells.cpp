@@ -19,10 +19,6 @@ Cell mean_cell(const analysis::SpeedSummary& s) {
 
 Cell sd_cell(const analysis::SpeedSummary& s) { return s.count > 1 ? Cell(s.sd) : Cell(""); }
 
-Cell p_cell(double p) { return std::isnan(p) ? Cell("") : Cell(p); }
-
-Cell p_cell(const std::optional<double>& p) { return p ? p_cell(*p) : Cell(""); }
-
 Cell effect_cell(const analysis::EffectSize& effect) {
   if (!std::isfinite(effect.value)) return Infinite{};
   return Estimate{effect.value, effect.lower, effect.upper};

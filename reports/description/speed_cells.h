@@ -15,9 +15,6 @@ Estimate mean_interval(const analysis::SpeedSummary& s);
 Cell mean_cell(const analysis::SpeedSummary& s);
 /// Shows the standard deviation; empty where there are not two values.
 Cell sd_cell(const analysis::SpeedSummary& s);
-/// Shows a p-value; empty where the test has none, or was not made.
-Cell p_cell(double p);
-Cell p_cell(const std::optional<double>& p);
 /// Shows an effect with its interval; infinite where it is no finite number.
 Cell effect_cell(const analysis::EffectSize& effect);
 /// Shows the first collision from which on two conditions are not told apart.

@@ -10,6 +10,7 @@
 #include "analysis/statistics/falling_order.h"
 #include "analysis/statistics/interval_95.h"
 #include "dynamics/catalogue/effect_catalogue.h"
+#include "reports/output/known_cell.h"
 
 namespace metastable::reports {
 namespace {
@@ -19,24 +20,18 @@ using analysis::Diagnosis;
 using analysis::EstimatedParameter;
 using analysis::GapCell;
 
-// What is not known is an empty cell.
-Cell known(double value) { return std::isnan(value) ? Cell("") : Cell(value); }
-Cell known(const std::optional<double>& value) { return value ? known(*value) : Cell(""); }
-// Steps that are not known, and a size of an effect without one, are 0.
-Cell positive(double value) { return value > 0 ? Cell(value) : Cell(""); }
-
 std::string short_number(double value) {
   return std::isnan(value) ? "unknown" : format_number(value, NumberFormat::general, 3);
 }
 
 // Shows a number whose 90 % interval may not be known.
 Cell with_interval(double value, double lower, double upper) {
-  if (std::isnan(value) || std::isnan(lower) || std::isnan(upper)) return known(value);
+  if (std::isnan(value) || std::isnan(lower) || std::isnan(upper)) return known_cell(value);
   return Estimate{value, lower, upper};
 }
 
 Cell with_interval(const EstimatedParameter& p) {
-  return p.fitted ? with_interval(p.value, p.lower, p.upper) : known(p.value);
+  return p.fitted ? with_interval(p.value, p.lower, p.upper) : known_cell(p.value);
 }
 
 // A nested model that comes out worse than the one it holds, or evidence of e^-100, says that the fit is no good.
@@ -44,7 +39,7 @@ Cell unless_hopeless(double value) {
   constexpr double hopeless = -100;
   if (value < hopeless)
     return NotShown{{value, value, value}, fmt::format("< {}", format_number(hopeless, NumberFormat::general, 3))};
-  return known(value);
+  return known_cell(value);
 }
 
 // Returns "leg 4, friction_ratio 0.879 (0.864 to 0.894)"; a list without its intervals.
@@ -160,7 +155,7 @@ Table map_table(const Diagnosis& d) {
   const auto score_of = [](const analysis::GapMap& map, std::size_t i, const GapCell& cell) {
     const bool same = i < map.cells.size() && map.cells[i].facet == cell.facet && map.cells[i].at == cell.at &&
                       map.cells[i].aspect == cell.aspect;
-    return same ? known(map.cells[i].statistic) : Cell("");
+    return same ? known_cell(map.cells[i].statistic) : Cell("");
   };
   for (std::size_t i = 0; i < d.gap.recalibrated.cells.size(); ++i) {
     const GapCell& cell = d.gap.recalibrated.cells[i];
@@ -212,8 +207,8 @@ Table causes_table(const Diagnosis& d) {
     const std::string name = cause.name();
     const bool inside = std::find(d.causes.set.begin(), d.causes.set.end(), name) != d.causes.set.end();
     rows.push_back({cause.probability,
-                    {name, cause.probability, inside ? "in" : "", unless_hopeless(cause.gain), known(cause.p_value),
-                     unless_hopeless(cause.evidence), parameters_text(cause)}});
+                    {name, cause.probability, inside ? "in" : "", unless_hopeless(cause.gain),
+                     known_cell(cause.p_value), unless_hopeless(cause.evidence), parameters_text(cause)}});
   }
   for (const auto& [name, p] :
        {std::pair("no gap", d.causes.p_no_gap), std::pair("recalibration", d.causes.p_recalibrate),
@@ -261,7 +256,7 @@ Table shrinkage_table(const Diagnosis& d) {
       closed = analysis::closed_is_known(s) ? Cell(share) : Cell(NotShown{share, analysis::closed_unknown(s)});
     }
     table.rows.push_back({s.measure, s.unit, with_interval(s.baseline, s.baseline_lower, s.baseline_upper),
-                          known(s.recalibrated), known(s.with_effect), known(s.floor), closed});
+                          known_cell(s.recalibrated), known_cell(s.with_effect), known_cell(s.floor), closed});
   }
   return table;
 }
@@ -278,7 +273,7 @@ Table steps_table(const Diagnosis& d) {
                           {.name = "with effect", .level = 90},
                           {.name = "this machine", .level = 90}}};
   const auto model = [](double value, const std::optional<Estimate>& interval) {
-    return value > 0 && interval ? Cell(Estimate{value, interval->lower, interval->upper}) : positive(value);
+    return value > 0 && interval ? Cell(Estimate{value, interval->lower, interval->upper}) : positive_cell(value);
   };
   const auto own = [](const analysis::MachineSteps& machine) {
     return machine.at_least ? Cell(fmt::format("at least {} (95 %)", short_number(machine.steps.lower)))
@@ -291,7 +286,7 @@ Table steps_table(const Diagnosis& d) {
   const auto here = std::ranges::find(s.machine, "", &analysis::MachineSteps::where);
   table.rows.push_back({"as measured",
                         s.observed > 0 ? Cell(Estimate{s.observed, s.observed_lower, s.observed_upper}) : Cell(""),
-                        positive(s.baseline), model(s.recalibrated, s.recalibrated_90),
+                        positive_cell(s.baseline), model(s.recalibrated, s.recalibrated_90),
                         model(s.with_effect, s.with_effect_90), here == s.machine.end() ? Cell("") : own(*here)});
   for (const analysis::MachineSteps& machine : s.machine)
     if (!machine.where.empty())
@@ -316,7 +311,7 @@ Table profile_table(const Diagnosis& d) {
                           std::isnan(p.measured) ? Cell("")
                           : std::isnan(half)     ? Cell(p.measured)
                                                  : Cell(Estimate{p.measured, p.measured - half, p.measured + half}),
-                          known(p.baseline), known(p.with_effect), known(p.band)});
+                          known_cell(p.baseline), known_cell(p.with_effect), known_cell(p.band)});
   }
   return table;
 }
@@ -332,7 +327,7 @@ Table visibility_table(const Diagnosis& d) {
     std::string alike;
     for (const auto& [effect, share] : v.alike)
       alike += fmt::format("{}{} {:.0f} %", alike.empty() ? "" : ", ", effect, 100 * share);
-    table.rows.push_back({v.effect, v.parameter, v.undecidable.empty() ? positive(v.smallest) : Cell(""),
+    table.rows.push_back({v.effect, v.parameter, v.undecidable.empty() ? positive_cell(v.smallest) : Cell(""),
                           std::string(effect_unit(v.effect, v.parameter)), alike, v.undecidable});
   }
   return table;
@@ -350,7 +345,7 @@ Table missing_table(const Diagnosis& d) {
   for (const analysis::MissingColumn& m : d.limits.missing) {
     if (m.effects.empty()) table.rows.push_back({m.column, "no effect is much harder to see", "", "", "", "", ""});
     for (const analysis::HiddenEffect& e : m.effects) {
-      table.rows.push_back({m.column, e.effect, e.parameter, known(e.smallest), known(e.smallest_with_it),
+      table.rows.push_back({m.column, e.effect, e.parameter, known_cell(e.smallest), known_cell(e.smallest_with_it),
                             std::string(effect_unit(e.effect, e.parameter)),
                             fmt::format("{}", fmt::join(e.not_told_from, ", "))});
     }
@@ -381,7 +376,7 @@ Table next_table(const Diagnosis& d) {
                                     "size; from {:.0f} on most experiments like it tell them apart.",
                                     d.rules.seen_gain)},
               .columns = {{"change"}, {"separation"}}};
-  for (const analysis::NextExperiment& n : d.limits.next) table.rows.push_back({n.change, known(n.separation)});
+  for (const analysis::NextExperiment& n : d.limits.next) table.rows.push_back({n.change, known_cell(n.separation)});
   return table;
 }
 

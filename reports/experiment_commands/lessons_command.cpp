@@ -19,6 +19,7 @@
 #include "analysis/statistics/interval_95.h"
 #include "reports/diagnosis/diagnosis_figures.h"
 #include "reports/diagnosis/diagnosis_tables.h"
+#include "reports/output/known_cell.h"
 #include "reports/output/page_folder.h"
 #include "reports/output/version.h"
 #include "reports/study/study_progress.h"
@@ -35,8 +36,6 @@ Diagnosis diagnosed(const Experiment& experiment, const std::string& what, const
   options.progress = study_progress(progress);
   return analysis::diagnose(experiment, options);
 }
-
-Cell steps_cell(double steps) { return steps > 0 ? Cell(steps) : Cell(""); }
 
 // Puts one diagnosis a row.
 Table answers(const std::string& id, const std::string& title, const std::string& what) {
@@ -78,9 +77,9 @@ void add_answer(Table& table, const std::string& what, const Diagnosis& d) {
   const analysis::StepsBeforeFailure& s = d.shrinkage.steps;
   row.push_back(s.observed > 0 && std::isfinite(s.observed)
                     ? Cell(Estimate{s.observed, s.observed_lower, s.observed_upper})
-                    : steps_cell(s.observed));
-  row.push_back(steps_cell(s.baseline));
-  row.push_back(steps_cell(s.with_effect));
+                    : positive_cell(s.observed));
+  row.push_back(positive_cell(s.baseline));
+  row.push_back(positive_cell(s.with_effect));
   table.rows.push_back(std::move(row));
   for (const std::string& note : d.data.notes)
     if (note.find("did not converge") != std::string::npos) table.notes.push_back(fmt::format("{}: {}.", what, note));

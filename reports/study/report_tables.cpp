@@ -8,26 +8,10 @@
 #include <string_view>
 
 #include "dynamics/wheel/contact_law.h"
+#include "reports/output/known_cell.h"
 
 namespace metastable::reports {
 namespace {
-
-// Where rest lies beyond the draws, all that is known of the steps is that they are more.
-Cell cell(const analysis::Estimate& estimate) {
-  if (std::isnan(estimate.value)) return "";
-  if (std::isinf(estimate.value) && std::isfinite(estimate.lower))
-    return "> " + format_number(estimate.lower, NumberFormat::general, 3);
-  if (std::isinf(estimate.value)) return Infinite{};
-  return Estimate{estimate.value, estimate.lower, estimate.upper};
-}
-
-Cell cell(const std::optional<double>& value) {
-  if (value) return *value;
-  return "";
-}
-
-// Of what there may be none, NaN then.
-Cell known(double value) { return std::isnan(value) ? Cell("") : Cell(value); }
 
 // Holds a quantity, with its unit, and its number in a study.
 struct Quantity {
@@ -42,9 +26,11 @@ Cell mean_cell(const std::optional<analysis::Accumulated>& total) {
 const std::vector<Quantity>& quantities() {
   using S = const Studied&;
   static const std::vector<Quantity> all = {
-      {"expected steps before failure, from the launch", "steps", [](S s) { return cell(s.study.steps.from_start); }},
-      {"the same from the metastable regime", "steps", [](S s) { return cell(s.study.steps.from_quasi_stationary); }},
-      {"the same from the worst start", "steps", [](S s) { return cell(s.study.steps.worst_start); }},
+      {"expected steps before failure, from the launch", "steps",
+       [](S s) { return estimate_cell(s.study.steps.from_start); }},
+      {"the same from the metastable regime", "steps",
+       [](S s) { return estimate_cell(s.study.steps.from_quasi_stationary); }},
+      {"the same from the worst start", "steps", [](S s) { return estimate_cell(s.study.steps.worst_start); }},
       {"standard deviation of the steps", "steps", [](S s) { return Cell(s.study.steps.distribution.sd); }},
       {"median of the steps", "steps",
        [](S s) {
@@ -59,13 +45,13 @@ const std::vector<Quantity>& quantities() {
        [](S s) {
          return s.study.spectrum.total_variation_steps ? Cell(*s.study.spectrum.total_variation_steps) : Cell("");
        }},
-      {"reaches the end of the ramp", "1", [](S s) { return cell(s.study.steps.reach_end); }},
-      {"speed before a collision, long-run mean", "rad/s", [](S s) { return known(s.study.survivors.mean); }},
-      {"its standard deviation", "rad/s", [](S s) { return known(s.study.survivors.sd); }},
+      {"reaches the end of the ramp", "1", [](S s) { return known_cell(s.study.steps.reach_end); }},
+      {"speed before a collision, long-run mean", "rad/s", [](S s) { return known_cell(s.study.survivors.mean); }},
+      {"its standard deviation", "rad/s", [](S s) { return known_cell(s.study.survivors.sd); }},
       {"the same mean with a new launch after each rest", "rad/s",
-       [](S s) { return known(s.study.survivors.restart_mean); }},
-      {"rest is unreachable for launches from", "rad/s", [](S s) { return cell(s.thresholds.safe_speed); }},
-      {"slope above which such launches exist", "deg", [](S s) { return cell(s.thresholds.safe_slope_deg); }}};
+       [](S s) { return known_cell(s.study.survivors.restart_mean); }},
+      {"rest is unreachable for launches from", "rad/s", [](S s) { return known_cell(s.thresholds.safe_speed); }},
+      {"slope above which such launches exist", "deg", [](S s) { return known_cell(s.thresholds.safe_slope_deg); }}};
   return all;
 }
 
@@ -186,7 +172,7 @@ Table answer_table(const std::vector<Studied>& studies, const Provenance& proven
       const auto found = std::ranges::find_if(studies, [&](const Studied& one) {
         return one.study.setting->law == law && one.study.setting->slope_deg == ramp;
       });
-      row.push_back(found == studies.end() ? Cell("") : cell(found->study.steps.from_start));
+      row.push_back(found == studies.end() ? Cell("") : estimate_cell(found->study.steps.from_start));
     }
     table.rows.push_back(std::move(row));
   }
@@ -309,7 +295,8 @@ Table grid_table(const std::string& id, const std::string& title, const analysis
                              NumberFormat::significant, 3});
   for (std::size_t i = 0; i < down.values.size(); ++i) {
     std::vector<Cell> row{down.values[i]};
-    for (std::size_t j = 0; j < across.values.size(); ++j) row.push_back(cell(steps[i * across.values.size() + j]));
+    for (std::size_t j = 0; j < across.values.size(); ++j)
+      row.push_back(estimate_cell(steps[i * across.values.size() + j]));
     table.rows.push_back(std::move(row));
   }
   table.notes = {"Expected steps before failure from the launch, with 95 % intervals."};
