@@ -160,8 +160,8 @@ Command collisions() {
         run_collisions(request);
       },
       "",
-      {"metastable simulate --stand-in --out filmed   # an experiment folder to try", "metastable collisions filmed",
-       "metastable collisions filmed --omega-minus peak --out -"}};
+      {"metastable simulate --stand-in --out stand-in   # an experiment folder to try",
+       "metastable collisions stand-in", "metastable collisions stand-in --omega-minus peak --out -"}};
 }
 
 Command describe() {
