@@ -3,8 +3,10 @@
 #include <algorithm>
 #include <atomic>
 #include <exception>
+#include <memory>
 #include <mutex>
 #include <thread>
+#include <utility>
 #include <vector>
 
 namespace metastable::markov {
@@ -50,6 +52,13 @@ void parallel_for(std::size_t count, int threads, const std::function<void(std::
     const std::scoped_lock lock(telling);
     progress(static_cast<double>(now) / static_cast<double>(count));
   });
+}
+
+std::function<void()> one_at_a_time(std::function<void()> listener) {
+  return [speaking = std::make_shared<std::mutex>(), listener = std::move(listener)] {
+    const std::scoped_lock lock(*speaking);
+    if (listener) listener();
+  };
 }
 
 }  // namespace metastable::markov

@@ -21,7 +21,11 @@ using Share = std::function<void(double share)>;
 /// Does the same, and `progress`, if there is one, is told a thousand times at most.
 void parallel_for(std::size_t count, int threads, const std::function<void(std::size_t)>& work, const Share& progress);
 
-/// Returns the same as a function to hand on, for those who know no threads.
+/// Returns a listener that any thread may call at any time, and that calls `listener`, if there is one, one call at a
+/// time. What it throws is passed on.
+std::function<void()> one_at_a_time(std::function<void()> listener);
+
+/// Returns parallel_for() as a function to hand on, for those who know no threads.
 inline auto on_threads(int threads) {
   return [threads](std::size_t count, const std::function<void(std::size_t)>& work) {
     parallel_for(count, threads, work);

@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <mutex>
 #include <optional>
 
 #include "analysis/fitting/bayes_factor.h"
@@ -47,11 +46,7 @@ std::map<std::string, double> probabilities_beside_unnamed(const TransitionModel
   const EffectScan scan = scan_effects(model, best.fit, varying, options.threads);
   if (scan.effects.size() != varying.size()) return {};
   const Effort effort = effort_for(model, recalibrated);
-  std::mutex speaking;
-  const auto beat = [&] {
-    const std::lock_guard lock(speaking);
-    heartbeat();
-  };
+  const std::function<void()> beat = markov::one_at_a_time(heartbeat);
   const std::vector<std::size_t> leading = leading_variations(model, scan, alone, options.rules);
   std::vector<Fit> with(leading.size());
   markov::parallel_for(with.size(), options.threads, [&](std::size_t k) {

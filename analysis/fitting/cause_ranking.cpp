@@ -3,12 +3,12 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
-#include <mutex>
 #include <utility>
 
 #include "analysis/fitting/effect_pairs.h"
 #include "analysis/fitting/effect_sets.h"
 #include "analysis/fitting/single_effects.h"
+#include "markov/parallel.h"
 
 namespace metastable::analysis {
 
@@ -50,12 +50,10 @@ const Fit& exact_part(const std::vector<RankedCause>& singles, const std::vector
 
 CauseRanking rank_causes(const TransitionModel& model, const Fit& recalibrated,
                          const std::vector<const Candidate*>& candidates, const RankingOptions& options) {
-  std::mutex speaking;
   double share = 0;
-  const auto beat = [&] {
-    const std::lock_guard lock(speaking);
+  const std::function<void()> beat = markov::one_at_a_time([&] {
     if (options.progress) options.progress(share);
-  };
+  });
   const auto reach = [&](double reached) {
     share = reached;
     beat();

@@ -2,11 +2,11 @@
 
 #include <algorithm>
 #include <boost/math/distributions/chi_squared.hpp>
-#include <mutex>
 
 #include "analysis/fitting/bayes_factor.h"
 #include "analysis/fitting/effect_fit.h"
 #include "analysis/fitting/effect_scan.h"
+#include "analysis/statistics/falling_order.h"
 #include "markov/parallel.h"
 
 namespace metastable::analysis {
@@ -54,24 +54,20 @@ std::vector<LeftInFacet> fitted_variations(const TransitionModel& model, const F
                                            const std::function<void()>& heartbeat) {
   if (scan.effects.empty()) return {};
   std::vector<LeftInFacet> all;
-  std::vector<std::size_t> order(scan.effects.size());  // by falling evidence promised
-  for (std::size_t i = 0; i < order.size(); ++i) {
+  std::vector<double> promised;
+  for (std::size_t i = 0; i < scan.effects.size(); ++i) {
     const ScannedEffect& scanned = scan.effects[i];
     all.push_back(as_left(model.variations()[i], scanned, scanned.gain[scanned.best], rules));
-    order[i] = i;
+    promised.push_back(all[i].evidence);
   }
-  std::sort(order.begin(), order.end(),
-            [&](std::size_t a, std::size_t b) { return all[a].evidence > all[b].evidence; });
+  const std::vector<std::size_t> order = falling_order(promised);
   const Effort effort = effort_for(model, recalibrated);
   const double least = std::max(0.0, all[order[0]].evidence - worth_fitting);
   std::size_t fitted = 0;
   while (fitted < std::min(effort.most_leaders, order.size()) && all[order[fitted]].evidence > least) ++fitted;
-  std::mutex speaking;
+  const std::function<void()> beat = markov::one_at_a_time(heartbeat);
   markov::parallel_for(fitted, threads, [&](std::size_t k) {
-    {
-      const std::lock_guard lock(speaking);
-      heartbeat();
-    }
+    beat();
     const ScannedEffect& scanned = scan.effects[order[k]];
     const Fit best = fit_one_more(model, effort, recalibrated, scanned);
     all[order[k]] = as_left(model.variations()[order[k]], scanned,

@@ -6,7 +6,6 @@
 #include <array>
 #include <cmath>
 #include <functional>
-#include <mutex>
 #include <numbers>
 #include <numeric>
 #include <stdexcept>
@@ -214,18 +213,14 @@ HeldOutGap gap_shrinkage(const TransitionModel& model, const Fit& given, const F
   const Eigen::MatrixXd cells = mean_columns(model);
   const std::vector<int> fold = folds_of_trials(trials, folds, seed);
   std::vector<HeldOut> held(trials);
-  std::mutex speaking;
-  const std::function<void()> speak = [&] {
-    const std::lock_guard lock(speaking);
-    if (heartbeat) heartbeat();
-  };
+  const std::function<void()> beat = markov::one_at_a_time(heartbeat);
   markov::parallel_for(static_cast<std::size_t>(folds), threads, [&](std::size_t f) {
-    speak();
+    beat();
     FitOptions options;
     options.count.resize(trials);
     for (std::size_t t = 0; t < trials; ++t) options.count[t] = fold[t] != static_cast<int>(f);
     const Fit plain = fit_from(recalibrated, model, recalibrated, options);
-    const Fit chosen = best_rival(model, recalibrated, rivals, plain, options, speak);
+    const Fit chosen = best_rival(model, recalibrated, rivals, plain, options, beat);
     const Eigen::VectorXd training = event_weights(model, options.count);
     const Flexible flexible = flexible_model(model, chosen, cells, training);
     const std::array<const Evaluation*, 3> models{&given.evaluation, &plain.evaluation, &chosen.evaluation};

@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <mutex>
 #include <numeric>
 #include <utility>
 
@@ -45,12 +44,9 @@ std::vector<Estimate> parts_closed(const TransitionModel& model, const Fit& reca
   const std::size_t trials = model.trials();
   const std::vector<int> fold = folds_of_trials(trials, folds, seed);
   std::vector<std::vector<double>> score(fits.size(), std::vector<double>(trials));
-  std::mutex speaking;
+  const std::function<void()> beat = markov::one_at_a_time(heartbeat);
   markov::parallel_for(fits.size() * static_cast<std::size_t>(folds), threads, [&](std::size_t task) {
-    if (heartbeat) {
-      const std::lock_guard lock(speaking);
-      heartbeat();
-    }
+    beat();
     const std::size_t k = task / static_cast<std::size_t>(folds);
     const auto f = static_cast<int>(task % static_cast<std::size_t>(folds));
     FitOptions options;

@@ -2,6 +2,7 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <atomic>
 #include <stdexcept>
 #include <vector>
@@ -25,6 +26,21 @@ TEST(Parallel, AnExceptionComesBackToTheCaller) {
                                 if (i == 17) throw std::runtime_error("seventeen");
                               }),
                  std::runtime_error);
+}
+
+TEST(Parallel, AListenerHearsOneCallAtATime) {
+  int inside = 0, most = 0, calls = 0;
+  const auto heard = one_at_a_time([&] {
+    most = std::max(most, ++inside);
+    ++calls;
+    --inside;
+  });
+  parallel_for(5000, 4, [&](std::size_t) { heard(); });
+  EXPECT_EQ(calls, 5000);
+  EXPECT_EQ(most, 1);
+  EXPECT_NO_THROW(one_at_a_time({})());
+  EXPECT_THROW(parallel_for(2, 2, [](std::size_t) { one_at_a_time([] { throw std::runtime_error("no"); })(); }),
+               std::runtime_error);
 }
 
 TEST(Parallel, ToldOfProgressMayEndTheWork) {
