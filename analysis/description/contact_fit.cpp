@@ -5,11 +5,11 @@
 #include <Eigen/Core>
 #include <algorithm>
 #include <cmath>
-#include <limits>
 #include <numbers>
 #include <stdexcept>
 
 #include "analysis/description/landings.h"
+#include "analysis/statistics/estimate.h"
 #include "analysis/statistics/minimize.h"
 #include "analysis/statistics/profile_interval.h"
 #include "dynamics/return_map/landing_density.h"
@@ -19,7 +19,6 @@
 namespace metastable::analysis {
 namespace {
 
-constexpr double infinity = std::numeric_limits<double>::infinity();
 constexpr double least_sd = 0.01;          // finer spreads are below the likelihood's grid
 constexpr std::size_t thinned_size = 300;  // transitions behind the choice of a start
 
@@ -69,11 +68,11 @@ constexpr ContactParameters lowest = {-0.5, 0, -0.5, 0}, highest = {1.5, 1, 0.85
 double cost(const ContactLikelihood& likelihood, const Point& x, Point& gradient) {
   for (std::size_t i = 0; i < 4; ++i) {
     const double value = i % 2 == 0 ? x[i] : std::abs(x[i]);
-    if (!(value >= lowest[i] && value <= highest[i])) return infinity;
+    if (!(value >= lowest[i] && value <= highest[i])) return infinite;
   }
   const ContactParameters p = to_parameters(x);
   constexpr double most = 30;  // sds between a mean and its range: beyond, the truncation leaves nothing
-  if (p[0] < -most * p[1] || p[0] > 1 + most * p[1] || p[2] < -most * p[3]) return infinity;
+  if (p[0] < -most * p[1] || p[0] > 1 + most * p[1] || p[2] < -most * p[3]) return infinite;
   ContactParameters slope;
   const double value = likelihood(p, &slope);
   for (std::size_t i = 0; i < 4; ++i) gradient[i] = -slope[i] * (i % 2 == 0 ? 1 : x[i] / p[i]);
@@ -92,7 +91,7 @@ Eigen::MatrixXd curvature(const SmoothFunction& function, const Minimum& minimum
     const bool inside = std::isfinite(function(above, up)) && std::isfinite(function(below, down));
     for (std::size_t b = 0; b < n; ++b)
       hessian(static_cast<Eigen::Index>(a), static_cast<Eigen::Index>(b)) =
-          inside ? (up[b] - down[b]) / (2 * step) : infinity;
+          inside ? (up[b] - down[b]) / (2 * step) : infinite;
   }
   return (hessian + hessian.transpose()) / 2;
 }
@@ -166,7 +165,7 @@ std::vector<Point> best_starts(const SmoothFunction& function, const Experiment&
 }
 
 void describe_curvature(ContactFit& fit, const Eigen::MatrixXd& information, const std::vector<std::size_t>& free) {
-  fit.standard_error.fill(infinity);
+  fit.standard_error.fill(infinite);
   if (!information.allFinite()) {
     fit.status = ContactFit::Status::undetermined;
     fit.message =
@@ -178,7 +177,7 @@ void describe_curvature(ContactFit& fit, const Eigen::MatrixXd& information, con
   const markov::SymmetricEigen eigen = markov::symmetric_eigen(information);
   for (Eigen::Index k = information.rows() - 1; k >= 0; --k) {
     FitDirection direction;
-    direction.sd = eigen.values[k] > 0 ? 1 / std::sqrt(eigen.values[k]) : infinity;
+    direction.sd = eigen.values[k] > 0 ? 1 / std::sqrt(eigen.values[k]) : infinite;
     for (std::size_t a = 0; a < free.size(); ++a)
       direction.weight[free[a]] = eigen.vectors(static_cast<Eigen::Index>(a), k);
     fit.directions.push_back(direction);
@@ -284,8 +283,8 @@ void describe_intervals(ContactFit& fit, const Maximum& best, bool intervals) {
     const ProfileInterval& profile = best.profiles[i];
     const double lower = sd ? to_sd(profile.lower) : profile.lower;
     const double upper = sd ? to_sd(profile.upper) : profile.upper;
-    fit.lower_95[i] = known && profile.bounded_below ? lower : sd && intervals ? 0 : -infinity;
-    fit.upper_95[i] = known && profile.bounded_above ? upper : infinity;
+    fit.lower_95[i] = known && profile.bounded_below ? lower : sd && intervals ? 0 : -infinite;
+    fit.upper_95[i] = known && profile.bounded_above ? upper : infinite;
   }
 }
 

@@ -6,7 +6,6 @@
 #include <array>
 #include <boost/math/distributions/chi_squared.hpp>
 #include <cmath>
-#include <limits>
 #include <stdexcept>
 
 #include "analysis/statistics/interval_95.h"
@@ -17,7 +16,6 @@
 namespace metastable::analysis {
 namespace {
 
-constexpr double infinity = std::numeric_limits<double>::infinity();
 // Draws of what stands for the machine, and of the recalibrated model: fewer save time.
 constexpr int draws_of_machine = 16, draws_of_recalibrated = 10;
 constexpr double of_no_say = 3;  // sd of the logarithm
@@ -121,9 +119,9 @@ void set_observed(StepsBeforeFailure& steps, std::pair<double, double> rests) {
     return degrees > 0 ? boost::math::quantile(boost::math::chi_squared(degrees), p) / 2 : 0.0;
   };
   const double most = limit(2 * rested + 2, 0.95), least = limit(2 * rested, 0.05);
-  steps.observed = rested > 0 ? at_risk / rested : infinity;
+  steps.observed = rested > 0 ? at_risk / rested : infinite;
   steps.observed_lower = at_risk / most;
-  steps.observed_upper = least > 0 ? at_risk / least : infinity;
+  steps.observed_upper = least > 0 ? at_risk / least : infinite;
 }
 
 std::vector<double> drawn_steps(const TransitionModel& model, const TransitionModel& at,
@@ -148,9 +146,9 @@ Estimate interval_of_draws(const std::vector<double>& draws) {
   if (draws.empty()) throw std::invalid_argument("interval_of_draws: there are no draws");
   const LogMoments log = log_moments(draws);
   if (log.endless > 0.5)
-    return {infinity, log.endless > 0.95 ? infinity : std::exp(log.mean - normal_90 * log.sd), infinity};
+    return {infinite, log.endless > 0.95 ? infinite : std::exp(log.mean - normal_90 * log.sd), infinite};
   const double half = normal_90 * log.sd;
-  return {std::exp(log.mean), std::exp(log.mean - half), log.endless > 0.05 ? infinity : std::exp(log.mean + half)};
+  return {std::exp(log.mean), std::exp(log.mean - half), log.endless > 0.05 ? infinite : std::exp(log.mean + half)};
 }
 
 Estimate joined_steps(const std::vector<double>& here, const std::vector<double>& there, const ModelError& error,

@@ -23,7 +23,6 @@ constexpr int most_collisions = 200;
 constexpr int curve_points = 40;
 constexpr double curve_end = 8;                // [rad/s]
 constexpr std::uint64_t longest_design = 300;  // collisions
-constexpr double infinite = std::numeric_limits<double>::infinity();
 
 // Returns the landings of the setting's wheel, each followed.
 std::shared_ptr<const dynamics::SettledMap> followed(const Setting& setting) {

@@ -5,7 +5,6 @@
 #include <algorithm>
 #include <boost/math/special_functions/gamma.hpp>
 #include <cmath>
-#include <limits>
 #include <optional>
 #include <stdexcept>
 #include <utility>
@@ -20,7 +19,6 @@
 namespace metastable::analysis {
 namespace {
 
-constexpr double never = std::numeric_limits<double>::infinity();
 constexpr std::uint64_t longest_roll = 512;  // collisions of a wheel
 constexpr std::uint64_t early = 32;  // collisions after which the launch is forgotten (by the 12th in all studies)
 constexpr std::size_t wheels_a_batch = 16;  // wheels between two looks at what has been rolled
@@ -69,7 +67,7 @@ void estimate(const Rolled& of, bool away, RigidBodyCheck& check) {
   if (of.late_rests == 0 || away) {
     check.at_least = true;
     const double least = low + share.lower * of.late_steps / most;
-    check.steps = {least, least, never};
+    check.steps = {least, least, infinite};
     return;
   }
   const double late = share.value * of.late_steps / of.late_rests;
@@ -197,7 +195,7 @@ RigidBodyCheck rigid_body_check(const Setting& setting, const RigidBodyOptions& 
                                  static_cast<double>(check.rests) / static_cast<double>(options.rests))));
   }
   if (same_contacts && check.rests < check.wheels)
-    check.steps = {never, never, never};  // one that rolls on after so many steps is on its orbit
+    check.steps = {infinite, infinite, infinite};  // one that rolls on after so many steps is on its orbit
   else
     estimate(rolled, any_away, check);
   return check;
@@ -211,7 +209,7 @@ RigidBodyVerdict BesideRigidBodies::verdict() const {
 }
 
 Estimate answered_steps(const Metastability& study) {
-  if (study.status == Status::rest_unresolved) return {never, never, never};
+  if (study.status == Status::rest_unresolved) return {infinite, infinite, infinite};
   return study.steps.from_start;
 }
 

@@ -4,7 +4,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <limits>
 #include <map>
 #include <mutex>
 #include <stdexcept>
@@ -19,7 +18,6 @@
 namespace metastable::analysis {
 namespace {
 
-constexpr double endless_steps = std::numeric_limits<double>::infinity();
 constexpr std::size_t most_scanned = 1000;
 
 // Returns a quantity on a scale on which both expected steps and their probabilities rise about in proportion to
@@ -60,7 +58,7 @@ Answered answered(const Metastability& found, const Target& target, const StudyO
     return {{}, found.message};
   const bool rarer_than_draws = found.status == Status::rest_unresolved;
   if (target.of == Target::Of::steps)
-    return {rarer_than_draws ? Estimate{endless_steps, endless_steps, endless_steps} : found.steps.from_start, ""};
+    return {rarer_than_draws ? Estimate{infinite, infinite, infinite} : found.steps.from_start, ""};
   return {rarer_than_draws ? Estimate{1, 1, 1} : probability(*found.steps.reach_end, found.steps.from_start), ""};
 }
 

@@ -1,7 +1,13 @@
 #pragma once
 // Holds a number with its interval.
 
+#include <limits>
+
 namespace metastable::analysis {
+
+/// What has no end, and what is not defined or was not asked.
+inline constexpr double infinite = std::numeric_limits<double>::infinity();
+inline constexpr double undefined = std::numeric_limits<double>::quiet_NaN();
 
 /// Holds a number with its 95 % interval; of positive quantities, value and upper end may be +infinity.
 struct Estimate {

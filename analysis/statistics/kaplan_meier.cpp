@@ -5,7 +5,6 @@
 #include <algorithm>
 #include <boost/math/distributions/beta.hpp>
 #include <cmath>
-#include <limits>
 #include <stdexcept>
 
 #include "analysis/statistics/interval_95.h"
@@ -14,7 +13,6 @@
 namespace metastable::analysis {
 namespace {
 
-constexpr double infinity = std::numeric_limits<double>::infinity();
 constexpr int resamples = 2000;
 constexpr std::uint64_t stream = 2;  // of random numbers
 
@@ -106,7 +104,7 @@ ExpectedSteps expected_steps(std::span<const ObservedSteps> trials, int steady_f
   std::sort(replicates.begin(), replicates.end());
   const auto quantile = [&](double p) { return replicates[static_cast<std::size_t>(p * (resamples - 1) + 0.5)]; };
   if (!steady) {
-    result.from_start = {seen.area, quantile(0.025), seen.survival > 0 ? infinity : quantile(0.975)};
+    result.from_start = {seen.area, quantile(0.025), seen.survival > 0 ? infinite : quantile(0.975)};
     result.failure_rate = {0, 0, 1};
     result.message = fmt::format("no trial met collision {}: the area under the survival curve{}", steady_from,
                                  seen.survival > 0 ? " so far, a lower bound" : "");
@@ -115,7 +113,7 @@ ExpectedSteps expected_steps(std::span<const ObservedSteps> trials, int steady_f
   result.failure_rate =
       exact_share(static_cast<std::size_t>(result.steady_rests), static_cast<std::size_t>(result.steady_collisions));
   if (result.steady_rests == 0) {
-    result.from_start = {infinity, quantile(0.05), infinity};
+    result.from_start = {infinite, quantile(0.05), infinite};
     result.message = fmt::format("no rest in {} collisions from collision {} on: only a lower bound (95 %)",
                                  result.steady_collisions, steady_from);
   } else {

@@ -4,12 +4,12 @@
 
 #include <algorithm>
 #include <cmath>
-#include <limits>
 #include <numbers>
 #include <optional>
 #include <stdexcept>
 #include <utility>
 
+#include "analysis/statistics/estimate.h"
 #include "dynamics/bounds/landing_bounds.h"
 #include "markov/chain/chain.h"
 #include "markov/parallel.h"
@@ -191,7 +191,7 @@ CertifiedSteps certify(const Setting& setting, const CertifyOptions& options) {
   const dynamics::WheelMap map = setting.map();
   const auto phase = static_cast<std::size_t>(setting.first_landing_leg % map.phases());
   CertifiedSteps result;
-  result.upper = std::numeric_limits<double>::infinity();
+  result.upper = infinite;
   if (setting.law == dynamics::Law::settled) {
     result.reason = "landings under settled are followed event by event, and of that there are no proven bounds";
     return result;

@@ -6,7 +6,6 @@
 #include <bit>
 #include <cmath>
 #include <iterator>
-#include <limits>
 #include <numeric>
 #include <stdexcept>
 #include <string>
@@ -29,8 +28,7 @@ constexpr double same_spectrum = 1e-6;        // and of two ways to its lambda_1
 constexpr double frequent_rest = 0.01;        // a step
 constexpr double rarest_launch = 1e-15;       // that counts: beyond 8 sds
 constexpr double rarest_rest = 1e-9;          // worth a word where the others never rest
-constexpr double unending = std::numeric_limits<double>::infinity();
-constexpr double least_regime = 1e-12;  // survivors of a step: fewer are the rounding of row sums
+constexpr double least_regime = 1e-12;        // survivors of a step: fewer are the rounding of row sums
 
 double dot(const std::vector<double>& a, const std::vector<double>& b) {
   return std::inner_product(a.begin(), a.end(), b.begin(), 0.0);
@@ -78,8 +76,7 @@ void describe_survivors(const Problem& problem, const markov::StateSpace& space,
 // Returns what the observable is if every wheel that rests is launched again; NaN where no launch goes on.
 MeanSd relaunched(const Problem& problem, std::span<const double> states, const markov::ChainSolver& solver,
                   const markov::Launch& launch) {
-  constexpr double none = std::numeric_limits<double>::quiet_NaN();
-  if (!goes_on(launch)) return {none, none};
+  if (!goes_on(launch)) return {undefined, undefined};
   return observe(problem, states, markov::stationary_with_restart(solver, launch.after));
 }
 
@@ -204,7 +201,7 @@ Metastability rest_unresolved(const Problem& problem, const StudyOptions& option
   result.status = Status::rest_unresolved;
   result.phases = problem.map.phases();
   result.message = "rest is possible, but " + message;
-  result.steps.from_start = result.steps.from_quasi_stationary = result.steps.worst_start = {unending, 1.0, unending};
+  result.steps.from_start = result.steps.from_quasi_stationary = result.steps.worst_start = {infinite, 1.0, infinite};
   result.spectrum.failure_rate = {0, 0, 1};
   return result;
 }
@@ -277,15 +274,14 @@ void summarize(const Problem& problem, const markov::StateSpace& space, std::spa
   }
   describe_survivors(problem, space, states, solved.survivors, result);
   const bool regime = 1 - quasi.failure_rate > least_regime;
-  if (!regime) result.survivors.mean = result.survivors.sd = std::numeric_limits<double>::quiet_NaN();
+  if (!regime) result.survivors.mean = result.survivors.sd = undefined;
   const MeanSd again = relaunched(problem, states, solver, launch);
   result.survivors.restart_mean = again.mean;
   result.survivors.restart_sd = again.sd;
   if (!options.brief)
     describe_violations(problem, space, solved.survivors, solver.solve_left(launch.after), options, result);
   if (!regime)
-    for (ViolationShare& share : result.violations)
-      share.quasi_stationary = share.quasi_stationary_error = std::numeric_limits<double>::quiet_NaN();
+    for (ViolationShare& share : result.violations) share.quasi_stationary = share.quasi_stationary_error = undefined;
 
   const markov::SparseSolver check(solver.revolution());
   const std::vector<double> ones(solver.revolution().size(), 1.0);
@@ -395,12 +391,12 @@ ForwardCourse followed_course(const markov::SampledChain& sampled, double never,
 Accumulated accumulated(double mean, bool finite, const std::vector<double>& survival) {
   double square = 0;
   for (std::size_t n = 0; finite && n < survival.size(); ++n) square += (2 * static_cast<double>(n) + 1) * survival[n];
-  Accumulated steps{mean, finite ? std::sqrt(std::max(0.0, square - mean * mean)) : unending, {}};
+  Accumulated steps{mean, finite ? std::sqrt(std::max(0.0, square - mean * mean)) : infinite, {}};
   for (const double level : quantile_levels) {
     const auto reached =
         std::find_if(survival.begin(), survival.end(), [&](double surviving) { return surviving <= 1 - level; });
     steps.quantiles.push_back(
-        {level, reached == survival.end() ? unending : static_cast<double>(reached - survival.begin())});
+        {level, reached == survival.end() ? infinite : static_cast<double>(reached - survival.begin())});
   }
   return steps;
 }
@@ -419,9 +415,9 @@ void summarize_endless(const Problem& problem, const markov::StateSpace& space, 
   const LaunchEnds ends = launch_ends(sampled, states);
   const bool finite = ends.never < rarest_launch;
   const bool relaunches = ever && !finite;  // else the long run is one of launches that rest
-  result.survivors.restart_mean = relaunches ? result.survivors.mean : std::numeric_limits<double>::quiet_NaN();
-  result.survivors.restart_sd = relaunches ? result.survivors.sd : std::numeric_limits<double>::quiet_NaN();
-  result.steps.from_quasi_stationary = result.steps.worst_start = {unending, unending, unending};
+  result.survivors.restart_mean = relaunches ? result.survivors.mean : undefined;
+  result.survivors.restart_sd = relaunches ? result.survivors.sd : undefined;
+  result.steps.from_quasi_stationary = result.steps.worst_start = {infinite, infinite, infinite};
   result.steps.from_start = finite ? Estimate{ends.steps, ends.steps, ends.steps} : result.steps.from_quasi_stationary;
   if (!finite && 1 - ends.never > rarest_rest)
     result.message =

@@ -5,15 +5,11 @@
 #include <algorithm>
 #include <cmath>
 #include <cstddef>
-#include <vector>
-
-#include "markov/parallel.h"
 
 namespace metastable::analysis {
 namespace {
 
-constexpr double nearly_done = 0.999;  // share of a study
-constexpr double rounding = 1e-9;      // relative, of sums over a chain without negative entries
+constexpr double rounding = 1e-9;  // relative, of sums over a chain without negative entries
 
 void require(bool holds, const std::string& what) {
   if (!holds) throw Contradiction(what);
@@ -47,7 +43,6 @@ void require_estimate(const std::string& name, const Estimate& estimate, double 
 
 void require_consistent(const Metastability& study) {
   if (study.status == Status::rest_unresolved) return;
-  constexpr double infinite = std::numeric_limits<double>::infinity();
   require_survival(study);
   require_estimate("expected steps", study.steps.from_start, 1, infinite);
   require_estimate("expected steps from the metastable regime", study.steps.from_quasi_stationary, 1, infinite);
@@ -56,36 +51,6 @@ void require_consistent(const Metastability& study) {
   for (const Agreement& a : study.agreements)
     require(std::abs(a.one - a.other) <= a.tolerance * std::abs(a.one),
             fmt::format("{}: {} by one way, {} by another", a.what, a.one, a.other));
-}
-
-void require_followed(const Problem& problem, const Metastability& study, const StudyOptions& options) {
-  constexpr double much = 0.1;
-  constexpr std::size_t launches = 4000;
-  const Estimate& memory = study.steps.memory;
-  const double moved = std::max({study.steps.landing_error, std::abs(memory.lower), std::abs(memory.upper)});
-  if (!problem.follow || !(moved > much)) return;
-  const std::size_t most = study.steps.survival.size();
-  std::vector<double> steps(launches);
-  markov::Share told;
-  if (options.progress) told = [&](double) { options.progress(nearly_done, "trials followed beside the chain"); };
-  markov::parallel_for(
-      launches, options.threads,
-      [&](std::size_t i) { steps[i] = static_cast<double>(problem.follow(options.seed, i, most)); }, told);
-  double sum = 0, square = 0, expected = 0;
-  for (const double n : steps) {
-    sum += n;
-    square += n * n;
-  }
-  for (const double s : study.steps.survival) expected += s;
-  const double mean = sum / launches, error = std::sqrt(std::max(0.0, square / launches - mean * mean) / launches);
-  const Estimate& all = study.steps.from_start;
-  const double lower = expected * all.lower / all.value, upper = expected * all.upper / all.value;
-  if (mean + 4 * error >= lower && mean - 4 * error <= upper) return;
-  throw StatesTooCoarse(fmt::format(
-      "of the first {} steps the chain of landings expects {:.4g} ({:.4g} to {:.4g}), and {} trials followed "
-      "without it take {:.4g} (standard error {:.2g}): a state at touch-down leaves out too much here, such "
-      "as feet that still hop or slide; simulate follows trials",
-      most, expected, lower, upper, launches, mean, error));
 }
 
 void require_overlap(const std::string& what, const std::string& name_a, const Estimate& a, const std::string& name_b,

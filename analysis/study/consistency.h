@@ -44,12 +44,6 @@ void require_consistent(const Metastability& study);
 /// Do the study's interval of the expected steps and the guaranteed bounds overlap? @throws Contradiction if not
 void require_consistent(const Metastability& study, const CertifiedSteps& certified);
 
-/// Where landings read from a table, or what states leave out, may move the expected steps by a tenth and more, an
-/// estimate of first order may miss how much: the events themselves are followed from 4000 launches, no further than
-/// survival is known, if `problem` can. @throws StatesTooCoarse with both numbers if what is followed lies outside the
-/// interval of the study by more than 4 standard errors
-void require_followed(const Problem& problem, const Metastability& study, const StudyOptions& options);
-
 /// Do two 95 % intervals of one quantity overlap? @throws Contradiction if not, naming both
 void require_overlap(const std::string& what, const std::string& name_a, const Estimate& a, const std::string& name_b,
                      const Estimate& b);

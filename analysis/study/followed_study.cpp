@@ -5,7 +5,6 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <limits>
 #include <map>
 #include <numeric>
 #include <queue>
@@ -18,9 +17,6 @@
 
 namespace metastable::analysis {
 namespace {
-
-constexpr double no_end = std::numeric_limits<double>::infinity();
-constexpr double undefined = std::numeric_limits<double>::quiet_NaN();
 
 // How far a launch is followed: where it neither rests nor shows a cycle within them, nothing is said. A landing of a
 // map costs 0.1 us, one that is followed 50 us. A limit shows long before an orbit is there, from its last changes.
@@ -52,7 +48,7 @@ struct Course {
   std::vector<double> cycle;  // states before the events of whole revolutions, from the launch's phase on
 
   bool ever() const { return end == End::cycles || end == End::grows; }
-  double count() const { return ever() ? no_end : static_cast<double>(steps); }
+  double count() const { return ever() ? infinite : static_cast<double>(steps); }
 };
 
 Run start(const Problem& problem, double state, int phase) {
@@ -291,7 +287,7 @@ Accumulated accumulated(const StepShares& shares) {
   double mean = 0, square = 0;
   for (const auto& [value, share] : shares) mean += share * value;
   for (const auto& [value, share] : shares) square += share * (value - mean) * (value - mean);
-  if (std::isinf(mean)) return {no_end, no_end, quantiles_of(shares)};
+  if (std::isinf(mean)) return {infinite, infinite, quantiles_of(shares)};
   if (shares.size() == 1) return {shares.begin()->first, 0, quantiles_of(shares)};
   return {mean, std::sqrt(square), quantiles_of(shares)};
 }
@@ -365,7 +361,7 @@ void describe_cycle(const Problem& problem, const std::vector<double>& cycle, Me
     for (std::size_t k = from; k < cycle.size(); k += phases) states.push_back(cycle[k]);
     std::sort(states.begin(), states.end());
     PhaseDistribution phase{states, std::vector<double>(states.size(), 1.0 / static_cast<double>(states.size())), 0, 0};
-    phase.edges.push_back(std::nextafter(states.back(), no_end));
+    phase.edges.push_back(std::nextafter(states.back(), infinite));
     double square = 0;
     for (const double state : states) {
       const double seen = problem.observable(state), share = 1.0 / static_cast<double>(states.size());
@@ -427,7 +423,7 @@ std::optional<double> safe_state(const Problem& problem) {
 }
 
 Estimate worst_start(const Problem& problem) {
-  double fewest = no_end;
+  double fewest = infinite;
   for (int p = 0; p < problem.map.phases(); ++p) {
     // The last digits of the lowest state may lie below the barrier.
     const double lowest = problem.map.state_interval(p).first;
@@ -461,11 +457,11 @@ void fill_expected(const Problem& problem, const Launches& launches, const Study
     if (share > 0 && std::isfinite(piece.most)) upper += share * piece.most;
     if (std::isinf(piece.most) && std::isfinite(piece.fewest)) apart += share, upper += share * piece.fewest;
     const double shown = std::isinf(piece.fewest) || std::isfinite(piece.most) ? piece.most : piece.fewest;
-    shares[std::isinf(piece.fewest) ? no_end : 0.5 * (piece.fewest + shown)] += share;
+    shares[std::isinf(piece.fewest) ? infinite : 0.5 * (piece.fewest + shown)] += share;
   }
   if (never > rarest) {
     result.status = Status::rest_unreachable;
-    result.steps.from_start = {no_end, no_end, no_end};
+    result.steps.from_start = {infinite, infinite, infinite};
     const std::string settles = settles_text(problem, *launches.ever);
     result.message = 1 - never > rarest
                          ? fmt::format(
@@ -543,7 +539,7 @@ Metastability followed_study(const Problem& problem, const StudyOptions& options
   const double failing = rests ? 1 : 0;
   result.spectrum.failure_rate = {failing, failing, failing};
   result.spectrum.moduli = {1 - failing};
-  const double after = rests ? 1 : no_end;
+  const double after = rests ? 1 : infinite;
   result.steps.from_quasi_stationary = {after, after, after};
   result.steps.worst_start =
       rests && without_noise(problem) ? worst_start(problem) : result.steps.from_quasi_stationary;

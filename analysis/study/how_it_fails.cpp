@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <limits>
 #include <utility>
 
 #include "analysis/study/chain_summary.h"
@@ -163,7 +162,7 @@ class Failures {
     const auto table = problem_.map.tabulate(phase, noise.draws.score);
     const std::vector<double> next = landings(i, *table, noise.draws);
     PathStep step{phase, {problem_.observable(state(i))}, {}};
-    double least = std::numeric_limits<double>::infinity();
+    double least = infinite;
     for (std::size_t n = 0; n < next.size(); ++n) {
       const bool leads_on =
           k == 0 ? std::isinf(next[n])

@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "analysis/statistics/t_interval.h"
+#include "analysis/study/trial_study.h"
 #include "markov/parallel.h"
 
 namespace metastable::analysis {
@@ -17,10 +18,10 @@ namespace {
 
 constexpr std::size_t replicates = 8;
 constexpr std::size_t fine_draws = 128, rough_draws = 32;  // of a replicate
-constexpr double rough_tolerance = 0.05;             // from it on rough draws do: their scatter is in the interval
-constexpr std::uint32_t of_landings = 1u << 20;      // the first of their randomisations
-constexpr double begins_at = 0.96, ends_at = 0.999;  // share of a study that is done
-constexpr double spread = 2;                         // [sd] of the scores by which memory is looked for
+constexpr double rough_tolerance = 0.05;         // from it on rough draws do: their scatter is in the interval
+constexpr std::uint32_t of_landings = 1u << 20;  // the first of their randomisations
+constexpr double begins_at = 0.96;               // share of a study that is done
+constexpr double spread = 2;                     // [sd] of the scores by which memory is looked for
 
 // Interpolates expected steps between the states of a phase: straight lines.
 class Between {
@@ -112,7 +113,7 @@ class Events {
   static markov::Share progress_of(const StudyOptions& options) {
     if (!options.progress) return {};
     return [&options](double share) {
-      options.progress(begins_at + (ends_at - begins_at) * share, "landings followed beside the table");
+      options.progress(begins_at + (before_trials - begins_at) * share, "landings followed beside the table");
     };
   }
 

@@ -4,7 +4,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <limits>
 #include <stdexcept>
 #include <utility>
 
@@ -25,7 +24,6 @@
 namespace metastable::analysis {
 namespace {
 
-constexpr double infinite = std::numeric_limits<double>::infinity();
 constexpr std::size_t first_cells = 128;
 constexpr std::size_t first_samples = 4096;
 constexpr std::size_t most_endless = 2048;     // cells a phase
@@ -417,6 +415,14 @@ Metastability study(const Setting& setting, const StudyOptions& options) {
   Metastability result = study(launched.problem(landing_options(own, 0.5, 0.5)), second);
   result.setting = launched;
   return result;
+}
+
+RestThresholds rest_thresholds(const Metastability& study) {
+  RestThresholds thresholds;
+  if (study.steps.safe_state) thresholds.safe_speed = std::sqrt(*study.steps.safe_state);
+  thresholds.safe_slope_deg = safe_slope_deg(study.setting.value());
+  thresholds.slope_sought = study.setting->law != dynamics::Law::settled;
+  return thresholds;
 }
 
 std::optional<double> Accumulated::quantile(double level) const {

@@ -197,6 +197,16 @@ void check_setting(const Setting& setting, Method method);
 /// @throws std::invalid_argument also as check_setting() and steadily_launched()
 Metastability study(const Setting& setting, const StudyOptions& options = {});
 
+/// Says what else is known of a setting's rest, beside its study.
+struct RestThresholds {
+  std::optional<double> safe_speed;      ///< launches at least this fast never come to rest [rad/s]
+  std::optional<double> safe_slope_deg;  ///< steeper ramps have such launches [deg]
+  bool slope_sought = true;              ///< false under `settled`: every slope would need a table of landings
+};
+/// Takes the speed from the study, the slope from safe_slope_deg(): a bisection.
+/// @throws std::bad_optional_access for a study without a setting
+RestThresholds rest_thresholds(const Metastability& study);
+
 /// Returns "converged", "tolerance_not_met", "rest_unreachable", ...: one word per status.
 std::string status_text(Status status);
 /// Returns "sampled", "integrated", "followed".

@@ -4,7 +4,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <limits>
 #include <utility>
 
 #include "analysis/study/consistency.h"
@@ -92,7 +91,7 @@ std::optional<Pilot> solve_pilot(const Problem& problem, const StudyOptions& opt
                    quasi.survival_weight,
                    early_visits(sampled),
                    beside,
-                   cells > pilot_cells ? top_of(space, nu) : std::numeric_limits<double>::infinity()};
+                   cells > pilot_cells ? top_of(space, nu) : infinite};
   }
 }
 

@@ -3,7 +3,6 @@
 
 #include <optional>
 
-#include "analysis/study/metastability.h"
 #include "analysis/study/problem.h"
 #include "analysis/study/setting.h"
 
@@ -26,16 +25,5 @@ RestReachability rest_reachability(const Problem& problem);
 /// launches), by bisection to 1e-6 deg; nothing if there are none at any slope below alpha/2. The ramp's slope in
 /// `setting` is ignored.
 std::optional<double> safe_slope_deg(const Setting& setting);
-
-/// Says what else is known of a setting's rest, beside its study.
-struct RestThresholds {
-  std::optional<double> safe_speed;      ///< launches at least this fast never come to rest [rad/s]
-  std::optional<double> safe_slope_deg;  ///< steeper ramps have such launches [deg]
-  bool slope_sought = true;              ///< false under `settled`: every slope would need a table of landings
-};
-
-/// Takes the speed from the study, the slope from safe_slope_deg(): a bisection.
-/// @throws std::bad_optional_access for a study without a setting
-RestThresholds rest_thresholds(const Metastability& study);
 
 }  // namespace metastable::analysis

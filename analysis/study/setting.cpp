@@ -4,12 +4,12 @@
 
 #include <algorithm>
 #include <cmath>
-#include <limits>
 #include <memory>
 #include <numbers>
 #include <stdexcept>
 #include <utility>
 
+#include "analysis/statistics/estimate.h"
 #include "analysis/study/consistency.h"
 #include "dynamics/return_map/settled_return_map.h"
 #include "dynamics/return_map/trials.h"
@@ -146,8 +146,7 @@ void Setting::validate() const {
                         pairs[i].restitution, dynamics::most_settled_restitution));
   }
   if (!steady_launch) launch();
-  if (ramp_length != std::numeric_limits<double>::infinity())
-    require_range("ramp length:", ramp_length, "m", range::ramp_length);
+  if (ramp_length != infinite) require_range("ramp length:", ramp_length, "m", range::ramp_length);
   if (first_landing_leg < 0 || first_landing_leg >= wheel.legs())
     throw std::invalid_argument(
         fmt::format("first landing leg: {} is outside 0..{}", first_landing_leg, wheel.legs() - 1));

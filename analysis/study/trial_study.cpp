@@ -4,11 +4,11 @@
 
 #include <algorithm>
 #include <cmath>
-#include <limits>
 #include <numeric>
 #include <utility>
 
 #include "analysis/statistics/t_interval.h"
+#include "analysis/study/consistency.h"
 #include "analysis/study/followed_study.h"
 #include "markov/parallel.h"
 #include "markov/transition_rows/draws.h"
@@ -16,13 +16,9 @@
 namespace metastable::analysis {
 namespace {
 
-constexpr double unbounded = std::numeric_limits<double>::infinity();
-constexpr double unasked = std::numeric_limits<double>::quiet_NaN();
-
 constexpr std::size_t checked_trials = 4096, checked_steps = 64;
-constexpr double surprising = 4;           // standard errors
-constexpr double after_the_study = 0.999;  // share of the work
-constexpr double few_failures = 16;        // a count of as many is normal: 4 standard errors reach to none
+constexpr double surprising = 4;     // standard errors
+constexpr double few_failures = 16;  // a count of as many is normal: 4 standard errors reach to none
 constexpr std::size_t unresolved_trials = 64, unresolved_steps = 2000;
 constexpr double most_events = 2e7, most_rolled = 2e5;  // of a trial study: by the map, by Problem::follow
 constexpr std::uint32_t of_trials = 1u << 24;           // the first of their randomisations
@@ -142,24 +138,42 @@ std::optional<Metastability> trial_study(const Problem& problem, const StudyOpti
   fill_steps(problem, shares, result);
   // Trials tell nothing of the regime: any rate is possible.
   result.spectrum.failure_rate = {1 / found.mean, 0, 1};
-  result.steps.from_quasi_stationary = {found.mean, 1, unbounded};
-  result.steps.worst_start = {1, 1, unbounded};
-  result.survivors.mean = result.survivors.sd = unasked;
-  result.survivors.restart_mean = result.survivors.restart_sd = unasked;
+  result.steps.from_quasi_stationary = {found.mean, 1, infinite};
+  result.steps.worst_start = {1, 1, infinite};
+  result.survivors.mean = result.survivors.sd = undefined;
+  result.survivors.restart_mean = result.survivors.restart_sd = undefined;
   return result;
+}
+
+void require_followed(const Problem& problem, const Metastability& study, const StudyOptions& options) {
+  constexpr double much = 0.1;
+  constexpr std::size_t launches = 4000;
+  const Estimate& memory = study.steps.memory;
+  const double moved = std::max({study.steps.landing_error, std::abs(memory.lower), std::abs(memory.upper)});
+  if (!problem.follow || !(moved > much)) return;
+  const std::size_t most = study.steps.survival.size();
+  const auto [mean, error] = mean_of(follow_trials(problem, options, 0, launches, most, false, before_trials).steps);
+  const double expected = std::accumulate(study.steps.survival.begin(), study.steps.survival.end(), 0.0);
+  const Estimate& all = study.steps.from_start;
+  const double lower = expected * all.lower / all.value, upper = expected * all.upper / all.value;
+  if (mean + surprising * error >= lower && mean - surprising * error <= upper) return;
+  throw StatesTooCoarse(fmt::format(
+      "of the first {} steps the chain of landings expects {:.4g} ({:.4g} to {:.4g}), and {} trials followed "
+      "without it take {:.4g} (standard error {:.2g}): a state at touch-down leaves out too much here, such "
+      "as feet that still hop or slide; simulate follows trials",
+      most, expected, lower, upper, launches, mean, error));
 }
 
 Metastability held_against_trials(const Problem& problem, Metastability study, const StudyOptions& options) {
   if (study.method == Method::followed || study.status == Status::rest_unreachable) return study;
   if (study.status == Status::rest_unresolved) {
-    const Trials trials =
-        follow_trials(problem, options, 0, unresolved_trials, unresolved_steps, true, after_the_study);
+    const Trials trials = follow_trials(problem, options, 0, unresolved_trials, unresolved_steps, true, before_trials);
     if (!trials.all_rest) return study;
     std::optional<Metastability> answer = trial_study(problem, options);
     return answer ? *std::move(answer) : study;
   }
   const std::size_t most = std::min<std::size_t>(study.steps.survival.size(), checked_steps);
-  const Trials trials = follow_trials(problem, options, 0, checked_trials, most, true, after_the_study);
+  const Trials trials = follow_trials(problem, options, 0, checked_trials, most, true, before_trials);
   const MeanError found = mean_of(trials.steps);
   const Estimate& all = study.steps.from_start;
   // Survival is that of the finest chain, whose own mean is not extrapolated. What that moves goes into the hazard

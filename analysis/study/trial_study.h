@@ -8,10 +8,19 @@
 
 namespace metastable::analysis {
 
+/// Share of a study that is done when its answer is held against trials.
+inline constexpr double before_trials = 0.999;
+
 /// Follows a problem with noise from drawn launches, to the tolerance or to a bounded number of events; nothing where
 /// trials are too long for that. The interval is Student's, of independent trials; Problem::follow is followed where
 /// there is one, otherwise the map.
 std::optional<Metastability> trial_study(const Problem& problem, const StudyOptions& options);
+
+/// Where landings read from a table, or what states leave out, may move the expected steps by a tenth and more, an
+/// estimate of first order may miss how much: the events themselves are followed from 4000 launches, no further than
+/// survival is known, if `problem` can. @throws StatesTooCoarse with both numbers if what is followed lies outside the
+/// interval of the study by more than 4 standard errors
+void require_followed(const Problem& problem, const Metastability& study, const StudyOptions& options);
 
 /// Holds the chain's answer against drawn trials. Cells and nodes smear noise that is much narrower than they are, and
 /// an extrapolation from them does not show it: if the steps of 4096 trials, counted no further than `survival` is

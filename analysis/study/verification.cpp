@@ -4,7 +4,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <limits>
 #include <numbers>
 #include <numeric>
 
@@ -166,7 +165,7 @@ Coverage coverage(const Problem& problem, double from_start, int seeds, int thre
     ++result.seeds;
     if (steps.lower <= from_start && from_start <= steps.upper) ++result.inside;
     const double half = 0.5 * (steps.upper - steps.lower) / steps.value;
-    result.widest = std::max(result.widest, std::isfinite(half) ? half : std::numeric_limits<double>::infinity());
+    result.widest = std::max(result.widest, std::isfinite(half) ? half : infinite);
   }
   return result;
 }

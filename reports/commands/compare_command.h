@@ -5,7 +5,7 @@
 #include <vector>
 
 #include "analysis/sensitivity/comparison.h"
-#include "analysis/study/rest_reachability.h"
+#include "analysis/study/metastability.h"
 #include "reports/commands/request.h"
 #include "reports/study/study_json.h"
 #include "reports/study/study_progress.h"

@@ -5,7 +5,6 @@
 #include <string>
 
 #include "analysis/study/metastability.h"
-#include "analysis/study/rest_reachability.h"
 #include "reports/commands/request.h"
 #include "reports/study/study_json.h"
 #include "reports/study/study_progress.h"

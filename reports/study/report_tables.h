@@ -8,7 +8,6 @@
 #include "analysis/sensitivity/sensitivity.h"
 #include "analysis/sensitivity/sweep.h"
 #include "analysis/study/metastability.h"
-#include "analysis/study/rest_reachability.h"
 #include "reports/output/table.h"
 
 namespace metastable::reports {

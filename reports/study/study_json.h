@@ -12,7 +12,6 @@
 #include "analysis/statistics/last_moments.h"
 #include "analysis/study/certify.h"
 #include "analysis/study/metastability.h"
-#include "analysis/study/rest_reachability.h"
 #include "reports/output/table.h"
 
 namespace metastable::reports {

@@ -8,7 +8,6 @@
 #include "analysis/sensitivity/rigid_body_check.h"
 #include "analysis/sensitivity/sensitivity.h"
 #include "analysis/study/metastability.h"
-#include "analysis/study/rest_reachability.h"
 
 namespace metastable::reports {
 
