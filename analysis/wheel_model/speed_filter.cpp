@@ -5,6 +5,7 @@
 #include <cmath>
 #include <utility>
 
+#include "dynamics/numerics/square.h"
 #include "dynamics/numerics/truncated_normal.h"
 
 namespace metastable::analysis {
@@ -27,8 +28,6 @@ constexpr std::array<Node, 3> three_nodes{
     {{-1.7320508075688772, 1.0 / 6}, {0, 2.0 / 3}, {1.7320508075688772, 1.0 / 6}}};
 
 double log_normal(double z) { return -0.5 * z * z - log_sqrt_two_pi; }
-
-double square(double v) { return v * v; }
 
 }  // namespace
 
@@ -67,7 +66,7 @@ void SpeedFilter::start(double reported) {
 SpeedFilter::Out SpeedFilter::collision(const ExtendedWheel& wheel, const StepContext& context, double reported) {
   const double seen = std::max(1e-3, reported - extension_.sensor.bias_after);
   const Before before{mean_, variance_};
-  const Out out = transition(wheel, context, seen, 1, std::sqrt(noise2_ + square(seen / mean_) * variance_));
+  const Out out = transition(wheel, context, seen, 1, std::sqrt(noise2_ + dynamics::square(seen / mean_) * variance_));
   update(wheel, out, seen);
   if (wheel.settles()) before_ = before;
   return out;
@@ -101,8 +100,8 @@ SpeedFilter::Out SpeedFilter::step(const ExtendedWheel& wheel, const StepContext
   const double step = 1e-4 * seen;
   const auto faster = wheel.back(context, seen + step), slower = wheel.back(context, seen - step);
   const double rate = faster && slower ? (*faster - *slower) / (2 * step) : seen / *plus;
-  Out out =
-      transition(wheel, context, *plus, rate, std::sqrt(noise2_ * rate * rate + square(*plus / mean_) * variance_));
+  Out out = transition(wheel, context, *plus, rate,
+                       std::sqrt(noise2_ * rate * rate + dynamics::square(*plus / mean_) * variance_));
   // It did go on: omega+ was beyond the barrier, of which the noise of the reported speed tells only so much.
   const double beyond = (*plus - wheel.barrier(context)) / std::max(1e-3, std::sqrt(noise2_ + slack2_) * rate);
   if (beyond < 8)
@@ -146,7 +145,8 @@ double SpeedFilter::chance_below(const ExtendedWheel& wheel, const StepContext& 
     return conditional(tilt_.below(wheel.rest_share(context, mean_, std::nullopt)));
   if (wheel.certain()) {
     const double plus = wheel.omega_plus(context, mean_, {}, false).value_or(0);
-    return std::max(1e-300, normal_cdf((bound - plus) / std::sqrt(noise2_ + square(plus / mean_) * variance_)));
+    return std::max(1e-300,
+                    normal_cdf((bound - plus) / std::sqrt(noise2_ + dynamics::square(plus / mean_) * variance_)));
   }
   return conditional(tilt_.below(wheel.after_collision(context, mean_, bound).below));
 }

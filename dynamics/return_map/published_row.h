@@ -9,6 +9,7 @@
 #include <numbers>
 #include <vector>
 
+#include "dynamics/numerics/square.h"
 #include "dynamics/numerics/truncated_normal.h"
 #include "dynamics/return_map/vector_math.h"
 
@@ -40,8 +41,6 @@ struct PublishedRow {
 struct Root {
   double at, weight;  // weight: 1/|g'|
 };
-
-[[gnu::always_inline]] inline double square(double x) { return x * x; }
 
 // Finds mu > mu_c with g(eta, mu) = level, for b_normal = b + c A with an A near that of the answer.
 [[gnu::always_inline]] inline double rough_friction(const PublishedRow& r, double a, double b_normal, double level) {

@@ -9,6 +9,7 @@
 #include <utility>
 
 #include "dynamics/numerics/normal_table.h"
+#include "dynamics/numerics/square.h"
 #include "dynamics/numerics/truncated_normal.h"
 #include "dynamics/settled/next_touch_sum.h"
 
@@ -17,8 +18,6 @@ namespace {
 
 constexpr std::size_t nodes_of_restitution = 12, nodes_of_all = 8;
 constexpr double far_score = 4.2, far_of_all = 3.4;  // of restitutions
-
-double square(double v) { return v * v; }
 
 // Contacts that gave one omega+, at some restitutions.
 struct Contacts {
