@@ -42,7 +42,7 @@ class Falls {
         threads_(threads),
         spacing_(options.spacing),
         lattice_(map.scores, map.scores == 1 ? score_spacing : score_spacing_of_several, score_reach),
-        frames_(study.orbit.frames.empty() ? markov::noise_frames(map, start) : study.orbit.frames),
+        frames_(study.orbit.frames),
         mesh_(map, frames_, start, markov::with_gaits(options, study.gaits)),
         passage_(study.gaits.states.size() < 2
                      ? markov::mesh_passage(mesh_, start)

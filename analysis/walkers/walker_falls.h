@@ -36,6 +36,7 @@ struct NamedNoise {
 /// through nodes; its noise is that which leads nearest to the next node, and the least that fails. "The gait" is the
 /// noise-free orbit.
 /// @param noises  one for each score
+/// @param study  with its orbit and two meshes or more, as mesh_study() gives it
 /// @throws std::invalid_argument for another number of noises; as markov::Mesh and markov::mesh_passage
 WalkerFalls how_it_falls(const markov::BatchMap& map, std::span<const double> start,
                          const std::vector<NamedNoise>& noises, const markov::MeshStudy& study,

@@ -5,6 +5,8 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <span>
+#include <vector>
 
 #include "analysis/statistics/median.h"
 #include "analysis/walkers/walker_trials.h"
@@ -15,10 +17,24 @@ namespace {
 
 const WalkerSetting garcia{Walker::simplest, 0.009 / degree, 0.0015 / degree, dynamics::Terrain::fresh};
 
-TEST(WalkerFalls, AreThoseOfWalksFollowed) {
+// The study of which it takes the orbit and the mesh in the middle, of this spacing.
+markov::MeshStudy meshed(const markov::BatchMap& map, std::span<const double> start, double spacing) {
+  markov::MeshStudy study;
+  study.orbit = markov::noise_free_orbit(map, start);
+  study.sizes.resize(2);
+  study.sizes[1].spacing = spacing;
+  return study;
+}
+WalkerStudy meshed(const WalkerSetting& setting, double spacing) {
+  const dynamics::WalkerMap map = setting.map();
   WalkerStudy study;
-  study.passage.sizes.resize(2);
-  study.passage.sizes[1].spacing = 0.6;  // of the mesh it takes
+  study.passage = meshed(batch_map(map),
+                         gait_state(setting, dynamics::find_gait(map.walker(), setting.slope_deg * degree)), spacing);
+  return study;
+}
+
+TEST(WalkerFalls, AreThoseOfWalksFollowed) {
+  const WalkerStudy study = meshed(garcia, 0.6);
   const WalkerFalls falls = how_it_falls(garcia, study, {});
   ASSERT_EQ(falls.moments.last.size(), 6u);
   ASSERT_EQ(falls.moments.state_names.size(), 2u);
@@ -63,11 +79,8 @@ TEST(WalkerFalls, QuantilesLieBetweenTheNodes) {
     }
   };
   for (const double spacing : {0.5, 0.3}) {
-    markov::MeshStudy study;
-    study.sizes.resize(2);
-    study.sizes[1].spacing = spacing;
     const std::vector<double> start{0, 0};
-    const WalkerFalls falls = how_it_falls(map, start, {{"z", 0, 1}}, study, {});
+    const WalkerFalls falls = how_it_falls(map, start, {{"z", 0, 1}}, meshed(map, start, spacing), {});
     // A mesh adds a sixth of the spacing squared to the variance at every step, the even cells half of that.
     const double sd = std::sqrt(1 / (1 - a * a)), wider = 1 + spacing * spacing / 4;
     for (const Estimate& state : falls.moments.regime.state) {
@@ -83,12 +96,8 @@ TEST(WalkerFalls, QuantilesLieBetweenTheNodes) {
 TEST(WalkerFalls, QuantilesDoNotMoveWithTheNodes) {
   const WalkerSetting steady{Walker::simplest, 0.009 / degree, 0.001 / degree, dynamics::Terrain::fresh};
   std::vector<Estimate> angle;
-  for (const double spacing : {0.6, 0.5}) {
-    WalkerStudy study;
-    study.passage.sizes.resize(2);
-    study.passage.sizes[1].spacing = spacing;
-    angle.push_back(how_it_falls(steady, study, {}).moments.regime.state[0]);
-  }
+  for (const double spacing : {0.6, 0.5})
+    angle.push_back(how_it_falls(steady, meshed(steady, spacing), {}).moments.regime.state[0]);
   EXPECT_NEAR(angle[0].value, angle[1].value, 0.003 * (angle[1].upper - angle[1].lower));
 }
 
