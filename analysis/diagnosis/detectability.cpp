@@ -2,7 +2,9 @@
 
 #include <algorithm>
 #include <cmath>
+#include <utility>
 
+#include "analysis/statistics/falling_order.h"
 #include "markov/dense_matrix.h"
 #include "markov/parallel.h"
 
@@ -52,7 +54,8 @@ std::vector<std::pair<std::string, double>> alike_to(const EffectScan& scan, con
   Eigen::VectorXd direction = scanned.start[scanned.best];
   if (count == 1 || !(direction.norm() > 0)) direction = Eigen::VectorXd::Unit(count, 0);
   const double strength = direction.dot(own * direction);
-  std::vector<std::pair<std::string, double>> alike;
+  std::vector<std::pair<std::string, double>> found;
+  std::vector<double> shares;
   for (const ScannedEffect& other : scan.effects) {
     if (other.candidate == scanned.candidate) continue;
     double share = 0;
@@ -61,9 +64,12 @@ std::vector<std::pair<std::string, double>> alike_to(const EffectScan& scan, con
       const Eigen::VectorXd cross = scan.information.block(at, scanned.first[scanned.best], size_of, count) * direction;
       share = std::max(share, taken_up(scan, at, size_of, cross) / strength);
     }
-    if (share > 0.5) alike.emplace_back(other.candidate->id, std::min(1.0, share));
+    if (!(share > 0.5)) continue;
+    found.emplace_back(other.candidate->id, std::min(1.0, share));
+    shares.push_back(found.back().second);
   }
-  std::sort(alike.begin(), alike.end(), [](const auto& a, const auto& b) { return a.second > b.second; });
+  std::vector<std::pair<std::string, double>> alike;
+  for (const std::size_t k : falling_order(shares)) alike.push_back(std::move(found[k]));
   return alike;
 }
 
@@ -122,9 +128,11 @@ std::vector<NextExperiment> next_experiments(const TransitionModel& model, const
     all[i].separation =
         std::max(0.0, size.dot(scan.information.block(0, 0, n, n) * size) - taken_up(scan, n, m, cross));
   });
-  std::sort(all.begin(), all.end(),
-            [](const NextExperiment& a, const NextExperiment& b) { return a.separation > b.separation; });
-  return all;
+  std::vector<double> separations;
+  for (const NextExperiment& one : all) separations.push_back(one.separation);
+  std::vector<NextExperiment> ranked;
+  for (const std::size_t k : falling_order(separations)) ranked.push_back(std::move(all[k]));
+  return ranked;
 }
 
 }  // namespace metastable::analysis

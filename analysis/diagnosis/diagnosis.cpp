@@ -148,12 +148,15 @@ Progress told_to(const DiagnosisOptions& options) {
   };
 }
 
-// The model as given and recalibrated, and every hypothesis.
+// The model as given and recalibrated with what it leaves, and every hypothesis.
 struct Fitted {
   Fit given;         // the model as given
   Fit given_slopes;  // likewise, with the information on its parameters
   Fit recalibrated;
   CauseRanking ranking;  // at the recalibrated model
+  GapMap given_map, recalibrated_map;
+  EffectScan variations;               // of the recalibrated model; empty where trials are too few for chance levels
+  std::vector<Detectability> visible;  // by candidate
   double gain() const { return 2 * (recalibrated.penalised - given.penalised); }
 };
 
@@ -226,11 +229,16 @@ Fitted fit_models(const TransitionModel& model, const std::vector<const Candidat
     fitted.ranking = rank();
   }
   // An effect on which the data hold no information is not decided, whatever its evidence.
-  const std::vector<Detectability> visible = detectability(fitted.ranking.scan, candidates, options.rules);
+  fitted.visible = detectability(fitted.ranking.scan, candidates, options.rules);
   std::vector<RankedCause>& singles = fitted.ranking.singles;
   for (std::size_t i = 0; i < singles.size(); ++i)
-    if (singles[i].not_decided.empty() && !candidates[i]->parameters.empty() && visible[i].smallest == 0)
-      singles[i].not_decided = visible[i].undecidable;
+    if (singles[i].not_decided.empty() && !candidates[i]->parameters.empty() && fitted.visible[i].smallest == 0)
+      singles[i].not_decided = fitted.visible[i].undecidable;
+  fitted.given_map = gap_map(model, fitted.given, options.draws / 2, options.seed);
+  progress(0.6, "where the gap lies");
+  fitted.recalibrated_map = gap_map(model, fitted.recalibrated, options.draws, options.seed);
+  if (fitted.ranking.scan.trials_suffice)
+    fitted.variations = scan_variations(model, fitted.recalibrated, options.threads);
   return fitted;
 }
 
@@ -248,9 +256,8 @@ FoundGap find_gap(const TransitionModel& model, const Fitted& fitted, std::size_
   gap.refitted = model.recalibrated();
   gap.recalibration_id = model.recalibration_id();
   gap.contact = contact_estimates(model, recalibrated);
-  gap.as_given = gap_map(model, fitted.given, options.draws / 2, options.seed);
-  progress(0.6, "where the gap lies");
-  gap.recalibrated = gap_map(model, recalibrated, options.draws, options.seed);
+  gap.as_given = fitted.given_map;
+  gap.recalibrated = fitted.recalibrated_map;
   std::vector<LeftInFacet>& facets = found.alone.facets;
   facets = left_by_facet(model, recalibrated, {}, options.rules);
   GapPValues p{.recalibration = recalibration_p_value(model, fitted.given_slopes, fitted.gain()),
@@ -258,8 +265,7 @@ FoundGap find_gap(const TransitionModel& model, const Fitted& fitted, std::size_
                .where = gap.recalibrated.p_value,
                .facets = facets_p_value(fitted.ranking, facets),
                .pairs = pairs_p_value(fitted.ranking, candidates, recalibrated)};
-  EffectScan variations;
-  if (suffice) variations = scan_variations(model, recalibrated, options.threads);
+  const EffectScan& variations = fitted.variations;
   const auto fit_variations = [&] {
     const auto beat = [&] { progress(0.66, "what has no name"); };
     beat();
@@ -349,34 +355,50 @@ std::pair<Verdict, Diagnosis::Causes> name_causes(const TransitionModel& model, 
   return {named.verdict, std::move(causes)};
 }
 
-// Puts the answer together from what each stage says.
-Diagnosis answer(const TransitionModel& model, const Fitted& fitted, const std::vector<const Candidate*>& candidates,
-                 const Elsewhere& elsewhere, const DiagnosisOptions& options, const Progress& progress) {
-  Diagnosis d;
+// What the rules decide, with what the rest of the answer is made from.
+struct Decided {
+  Diagnosis d;  // data, gap, causes, verdict; visible effects and measures of the shrinkage
+  Hypotheses ranked;
+  const Fit* cause;  // of the best hypothesis, or the recalibrated model
+  HeldOutGap held_out;
+};
+Decided decide(const TransitionModel& model, const Fitted& fitted, const std::vector<const Candidate*>& candidates,
+               const DiagnosisOptions& options, const Progress& progress) {
+  Decided decided;
+  Diagnosis& d = decided.d;
   d.rules = options.rules;
   d.data = described_data(model);
-  d.limits.visible = detectability(fitted.ranking.scan, candidates, d.rules);
+  d.limits.visible = fitted.visible;
   FoundGap found = find_gap(model, fitted, candidates.size(), options, progress);
   std::ranges::move(notes_on_roughness(fitted, d.data), std::back_inserter(d.data.notes));
   d.gap = found.gap;
   const Tested tested{d.gap.p_value < options.level, d.gap.p_recalibration < options.level};
 
   progress(0.68, "what is left");
-  const Hypotheses ranked = hypotheses(model, fitted.ranking);
-  const RankedCause* best = ranked.best();
-  const RankedCause* second = ranked.ordered.size() > 1 ? ranked.ordered[1] : nullptr;
-  Chosen chosen = best_hypothesis(model, fitted, ranked, std::move(found), tested.gap, options);
-  const Fit& cause = *chosen.fit;
+  decided.ranked = hypotheses(model, fitted.ranking);
+  Chosen chosen = best_hypothesis(model, fitted, decided.ranked, std::move(found), tested.gap, options);
+  decided.cause = chosen.fit;
   d.gap.left = chosen.left;
   progress(0.7, "how far it shrinks");
-  const HeldOutGap held_out = hold_out(model, fitted, ranked, d.data, chosen, options, progress);
-  d.shrinkage.measures = held_out.measures;
+  decided.held_out = hold_out(model, fitted, decided.ranked, d.data, chosen, options, progress);
+  d.shrinkage.measures = decided.held_out.measures;
   if (tested.gap && trials_to_explain(d.data)) chosen.unnamed.alone = std::max(chosen.unnamed.alone, d.rules.even_odds);
   std::tie(d.verdict, d.causes) =
-      name_causes(model, fitted, ranked, std::move(chosen), candidates.size(), d, tested, options, progress);
+      name_causes(model, fitted, decided.ranked, std::move(chosen), candidates.size(), d, tested, options, progress);
+  return decided;
+}
+
+// Puts the answer together from what each stage says.
+Diagnosis answer(const TransitionModel& model, const Fitted& fitted, const std::vector<const Candidate*>& candidates,
+                 const Elsewhere& elsewhere, const DiagnosisOptions& options, const Progress& progress) {
+  Decided decided = decide(model, fitted, candidates, options, progress);
+  Diagnosis& d = decided.d;
+  const std::vector<const RankedCause*>& ordered = decided.ranked.ordered;
+  const RankedCause* best = decided.ranked.best();
+  const Fit& cause = *decided.cause;
   if (best && !d.shrinkage.measures.empty() && d.shrinkage.measures.front().closed)
-    add_closed_shares(d.causes.at_work, model, fitted.ranking, *best, fitted.given, fitted.recalibrated, held_out.gap,
-                      options, [&] { progress(0.86, "what each effect closes"); });
+    add_closed_shares(d.causes.at_work, model, fitted.ranking, *best, fitted.given, fitted.recalibrated,
+                      decided.held_out.gap, options, [&] { progress(0.86, "what each effect closes"); });
 
   progress(0.88, "steps before failure");
   d.shrinkage.steps = steps_before_failure(model, fitted.given.nuisance, fitted.recalibrated, cause, options.seed);
@@ -384,17 +406,17 @@ Diagnosis answer(const TransitionModel& model, const Fitted& fitted, const std::
     d.shrinkage.measures.push_back(rest_shrinkage(at_risk, rests, d.shrinkage.steps));
   add_machine_steps(
       d, model, {&fitted.recalibrated, 1},
-      is_gap(d.verdict) && &cause != &fitted.recalibrated ? telling(ranked.ordered, d) : std::vector<WeighedFit>{},
-      elsewhere, options, [&] { progress(0.9, "steps before failure"); });
+      is_gap(d.verdict) && &cause != &fitted.recalibrated ? telling(ordered, d) : std::vector<WeighedFit>{}, elsewhere,
+      options, [&] { progress(0.9, "steps before failure"); });
   d.shrinkage.profile = collision_profile(model, fitted.given.nuisance, cause, options.seed);
   progress(0.93, "what could not be seen");
   d.limits.missing = missing_columns(model, fitted.recalibrated, candidates, d.rules, options.threads, options.seed);
   d.limits.not_possible = not_possible(model, d, options);
-  if (d.verdict == Verdict::explained && d.causes.set.size() > 1 && second)
-    d.limits.next = next_experiments(model, best->fit, second->terms, options.threads, options.seed);
+  if (d.verdict == Verdict::explained && d.causes.set.size() > 1 && ordered.size() > 1)
+    d.limits.next = next_experiments(model, best->fit, ordered[1]->terms, options.threads, options.seed);
   progress(1, "done");
   d.sentences = sentences(d);
-  return d;
+  return std::move(d);
 }
 
 }  // namespace
@@ -434,12 +456,11 @@ Diagnosis diagnose(const TransitionModel& model, const DiagnosisOptions& options
   return answer(model, fit_models(model, candidates, options, progress), candidates, elsewhere, options, progress);
 }
 
-std::vector<Diagnosis> diagnose_each(const TransitionModel& model, const DiagnosisOptions& options,
-                                     const std::vector<Rules>& rules) {
+std::vector<Diagnosis> decide_each(const TransitionModel& model, const DiagnosisOptions& options,
+                                   const std::vector<Rules>& rules) {
   check(model, options);
   const std::vector<const Candidate*> candidates = wanted(model, options.catalogue);
   const Progress progress = told_to(options);
-  const Elsewhere elsewhere = asked_elsewhere(model, options);
   std::vector<std::pair<Rules, Fitted>> known;
   std::vector<Diagnosis> all;
   for (const Rules& these : rules) {
@@ -447,7 +468,7 @@ std::vector<Diagnosis> diagnose_each(const TransitionModel& model, const Diagnos
     with.rules = these;
     auto same = std::ranges::find_if(known, [&](const auto& one) { return one.first.fits_as(these); });
     if (same == known.end()) same = known.insert(same, {these, fit_models(model, candidates, with, progress)});
-    all.push_back(answer(model, same->second, candidates, elsewhere, with, progress));
+    all.push_back(decide(model, same->second, candidates, with, progress).d);
   }
   return all;
 }

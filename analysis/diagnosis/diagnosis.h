@@ -211,10 +211,10 @@ Diagnosis diagnose(const TransitionModel& model, const DiagnosisOptions& options
 /// @throws std::invalid_argument also where there is no model
 Diagnosis diagnose(std::shared_ptr<const TransitionModel> model, const DiagnosisOptions& options = {});
 
-/// Diagnoses under each of several sets of rules (DiagnosisOptions::rules does not count); what is fitted alike is
-/// fitted once.
+/// Decides under each of several sets of rules (DiagnosisOptions::rules does not count): data, gap, causes and verdict
+/// are what diagnose() finds, and the rest of the answer is left out. What is fitted alike is fitted once.
 /// @throws as diagnose()
-std::vector<Diagnosis> diagnose_each(const TransitionModel& model, const DiagnosisOptions& options,
-                                     const std::vector<Rules>& rules);
+std::vector<Diagnosis> decide_each(const TransitionModel& model, const DiagnosisOptions& options,
+                                   const std::vector<Rules>& rules);
 
 }  // namespace metastable::analysis

@@ -7,6 +7,7 @@
 
 #include "analysis/fitting/bayes_factor.h"
 #include "analysis/fitting/effect_sets.h"
+#include "analysis/statistics/falling_order.h"
 #include "markov/parallel.h"
 
 namespace metastable::analysis {
@@ -98,18 +99,21 @@ void fit_pairs(const RankingProblem& problem, const SingleEffects& singles, cons
 // A pair may gain beyond its first effect because its fit came upon a better optimum of that effect.
 void refit_from_pairs(const RankingProblem& problem, EffectPairs& ranked, ScansBeside& beside) {
   SingleEffects& singles = ranked.singles;
-  std::vector<const RankedCause*> gaining;
+  std::vector<const RankedCause*> candidates;
+  std::vector<double> gains;
   for (const RankedCause& pair : ranked.pairs) {
     const RankedCause& first = singles.causes[problem.index_of(pair.terms[0].candidate)];
     if (std::isfinite(pair.evidence) && !pair.terms[0].candidate->parameters.empty() &&
         pair.gain > first.gain + gained_beside &&
         problem.model.evaluate(pair.fit.nuisance, std::vector{pair.terms[0]}).total() >
-            first.fit.log_likelihood - lost_alone)
-      gaining.push_back(&pair);
+            first.fit.log_likelihood - lost_alone) {
+      candidates.push_back(&pair);
+      gains.push_back(pair.gain);
+    }
   }
-  std::sort(gaining.begin(), gaining.end(),
-            [](const RankedCause* a, const RankedCause* b) { return a->gain > b->gain; });
-  gaining.resize(std::min(gaining.size(), most_other_ways));
+  std::vector<const RankedCause*> gaining;
+  for (const std::size_t k : falling_order(gains))
+    if (gaining.size() < most_other_ways) gaining.push_back(candidates[k]);
   std::vector<Fit> again(gaining.size());
   markov::parallel_for(gaining.size(), problem.threads, [&](std::size_t k) {
     problem.heartbeat();

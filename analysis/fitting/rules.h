@@ -117,7 +117,7 @@ struct Rules {
   /// Says whether hypotheses are fitted and weighed alike under other rules.
   bool fits_as(const Rules& other) const {
     return expected_gain == other.expected_gain && model_error == other.model_error && pair_prior == other.pair_prior &&
-           most_hidden == other.most_hidden;
+           most_hidden == other.most_hidden && seen_gain == other.seen_gain;
   }
   /// Returns the odds of something without a name below which a gap is explained.
   double most_odds_of_none() const { return (1 - least_at_work) / least_at_work; }
