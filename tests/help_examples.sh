@@ -14,7 +14,7 @@ failed=0
 declare -A ran
 
 shown_on_a_page() {  # arguments: an example
-  [[ $1 =~ ^metastable\ (steps|compare|sweep|solve)\  ]] &&
+  [[ $1 =~ ^metastable\ (steps|compare|sweep|solve|describe)\  ]] &&
     grep -qxF -- "\$ $1" "$pages"/README.md "$pages"/reports/site/*.md
 }
 

@@ -143,7 +143,7 @@ Command solve() {
           },
           "",
           {"metastable solve friction-mean --slope 9.59 --steps 100",
-           "metastable solve slope --friction 0.3,0.05 --steps 1000",
+           "metastable solve slope --survive 1000:0.9 --friction 0.3,0.05 --legs 0.1519 --law published",
            "metastable solve friction-sd --slope 9.59 --friction 0.3 --survive 1000:0.9"}};
 }
 
