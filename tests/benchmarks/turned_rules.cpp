@@ -1,7 +1,7 @@
 // Not timed: turns each rule of the diagnosis by a quarter up and down on sealed cases, and prints what changes.
 //
-//   metastable blind make RUN --seed 4242 --per-effect 1 --none 12 --pairs 12 --outside 12 --mixed 8 --many 8 \
-//     --left-out 0
+//   options="--per-effect 1 --left-out 0 --none 12 --pairs 12 --outside 12 --mixed 8 --many 8"
+//   metastable blind make RUN --seed 4242 $options
 //   turned_rules RUN OF_EACH [RULE...]
 //
 // It takes the first OF_EACH cases of each kind, and turns all rules where none is named. Truths are read, so that the
