@@ -113,9 +113,9 @@ dynamics::WheelMap Setting::map() const {
 
 void Setting::validate() const {
   namespace range = dynamics::range;
-  const dynamics::WheelMap wheel_map = map();
   for (std::size_t i = 0; i < wheel.leg_length.size(); ++i)
     require_range(fmt::format("leg_length[{}]:", i), wheel.leg_length[i], "m", range::leg_length);
+  const dynamics::WheelMap wheel_map = map();
   require_range("hub_mass:", wheel.hub_mass, "kg", range::mass);
   if (wheel.contact_mass) require_range("contact_mass:", *wheel.contact_mass, "kg", range::mass);
   require_range("ramp_stiffness:", wheel.ramp_stiffness, "N/m", range::ramp_stiffness);

@@ -70,7 +70,7 @@ TEST(LeftOver, EventsThatScatterLittleAreNoSurer) {
   const test::Line model(y, w);
   const std::vector<LeftInFacet> left = left_by_facet(model, fit(model, {3, -0.7}, {}), {}, Rules{});
   const auto by_number = std::ranges::find_if(
-      left, [](const LeftInFacet& one) { return one.facet == "collision" && one.aspect == "spread"; });
+      left, [](const LeftInFacet& one) { return one.facet == "step" && one.aspect == "spread"; });
   ASSERT_NE(by_number, left.end());
   EXPECT_GT(by_number->quadratic, 15);
   EXPECT_LT(by_number->quadratic, 32);

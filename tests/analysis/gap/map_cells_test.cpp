@@ -58,11 +58,11 @@ TEST(MapCells, RangesHoldWhatTheyAreNamedAfter) {
   }
 }
 
-TEST(MapCells, CollisionsGroupByNumber) {
+TEST(MapCells, StepsGroupByNumber) {
   std::map<std::string, std::size_t> counts;
-  for (const MapCell& cell : of_facet(map_cells(straight), "collision")) counts[cell.at] = cell.events.size();
+  for (const MapCell& cell : of_facet(map_cells(straight), "step")) counts[cell.at] = cell.events.size();
   EXPECT_EQ(counts, (std::map<std::string, std::size_t>{
-                        {"collision 1", 100}, {"collision 2", 100}, {"collisions 3 to 4", 200}}));
+                        {"step 1", 100}, {"step 2", 100}, {"steps 3 to 4", 200}}));
 }
 
 TEST(MapCells, ATrendRunsFromTheFirstTrialToTheLast) {

@@ -32,7 +32,7 @@ TEST(Setting, ErrorsNameTheQuantityAndItsRange) {
     Setting setting;
     change(setting);
     const std::string said = message_of([&] { setting.problem(); });
-    EXPECT_NE(said.find(part), std::string::npos);
+    EXPECT_NE(said.find(part), std::string::npos) << said;
     EXPECT_EQ(said.find('\n'), std::string::npos);
   };
   expect_message([](Setting& s) { s.slope_deg = 25; }, "22.5");

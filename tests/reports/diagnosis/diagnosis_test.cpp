@@ -114,7 +114,7 @@ TEST(DiagnosisJson, HasTheKeysOfTheSchema) {
   EXPECT_EQ(json.at("not_decided").at(0).at("reason"), "the fit did not converge");
   EXPECT_EQ(json.at("unnamed_supposed").at(0).at("beside"), std::vector<std::string>{"leg_contact"});
   EXPECT_EQ(json.at("unnamed_supposed").at(0).at("facets").at(0).at("chi_squared"), 12);
-  EXPECT_EQ(json.at("unnamed_supposed").at(0).at("facets").at(0).at("of"), "collisions");
+  EXPECT_EQ(json.at("unnamed_supposed").at(0).at("facets").at(0).at("of"), "steps");
   EXPECT_TRUE(json.at("missing_columns").at(0).at("effects").at(0).at("smallest").is_null());
   EXPECT_EQ(json.at("missing_columns").at(0).at("effects").at(0).at("not_told_from").at(0), "friction_patch");
   EXPECT_EQ(json.at("not_possible").at(0).at("trials"), 3);
@@ -222,7 +222,7 @@ TEST(DiagnosisText, EveryVerdictSaysWhatToDoNext) {
   d.verdict = analysis::Verdict::no_gap;
   EXPECT_NE(next().find("Use the model as it is"), std::string::npos) << next();
   d.verdict = analysis::Verdict::recalibrate;
-  EXPECT_NE(next().find("experiment.toml"), std::string::npos) << next();
+  EXPECT_NE(next().find("Give the model the recalibrated parameters"), std::string::npos) << next();
   d.verdict = analysis::Verdict::unexplained;
   EXPECT_NE(next().find("Check the measurement first"), std::string::npos) << next();
 }

@@ -50,5 +50,5 @@ refused 'no-such-folder' sweep --slope 8:9:0.5 --initial-speed 5.5,0.3 --out no-
 refused '--threads' sweep --slope 8:9:0.5 --initial-speed 5.5,0.3 --threads 2
 
 said=$(ranks 2 mesh --walker compass --slope-sd 0.5 --spacing 0.3 --memory 0.001 2>&1 >/dev/null)
-[[ $? == 3 && $said == *'takes more than 0.0 GB'* ]] || fault "a mesh beyond --memory: '$said'"
+[[ $? == 3 && $said == *'takes more than 0.001 GB'* ]] || fault "a mesh beyond --memory: '$said'"
 exit $failed
