@@ -67,8 +67,8 @@ void put_together(Diagnosis::Gap& gap, const GapPValues& p, const Rules& rules) 
   gap.p_where = bounded(p.where);
   gap.p_facets = bounded(p.facets);
   gap.p_variations = bounded(p.variations);
-  gap.p_value = std::min({1.0, gap.p_effects / rules.share_for_effects, gap.p_where / rules.share_for_cells,
-                          gap.p_facets / rules.share_for_facets, gap.p_variations / rules.share_for_variations,
+  gap.p_value = std::min({1.0, gap.p_effects / rules.share_for_effects,
+                          std::min({gap.p_where, gap.p_facets, gap.p_variations}) / rules.share_for_unnamed(),
                           bounded(p.pairs) / rules.share_for_pairs});
   gap.p_as_given = std::min(1.0, 2 * std::min(gap.p_recalibration, gap.p_value));
 }

@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <boost/math/distributions/chi_squared.hpp>
 #include <cmath>
 #include <iterator>
 #include <string>
@@ -23,6 +24,13 @@ namespace {
 constexpr double largest_log_odds = 300;  // of something unnamed: their exponential stays finite
 constexpr std::size_t most_beside = 3;    // hypotheses, the recalibrated model not counted,
 constexpr double beside_margin = 12;      //   whose evidence is no further behind the best
+
+// Returns the square that the largest of so many standard normals exceeds with this probability, to first order.
+double square_by_chance(double level, std::size_t cells) {
+  const boost::math::chi_squared square(1);
+  return boost::math::quantile(
+      boost::math::complement(square, level / static_cast<double>(std::max<std::size_t>(1, cells))));
+}
 
 double odds_of(double log_odds) { return std::exp(std::min(largest_log_odds, log_odds)); }
 
@@ -180,8 +188,8 @@ Chosen choose(const TransitionModel& model, const CauseRanking& ranking, const s
   for (Joined& one : joined) chosen.supposed.push_back(std::move(one.unnamed));
   const double tolerated = rules.square_error();
   const double beyond = chosen.left.largest_beyond(tolerated * gained.collisions, tolerated * gained.stances);
-  if (chosen.left.p_value < rules.remaining_level && beyond > rules.remaining_square)
-    chosen.unnamed.left = odds_of(0.5 * (beyond - rules.remaining_square));
+  const double square = square_by_chance(rules.remaining_level, chosen.left.cells.size());
+  if (beyond > square) chosen.unnamed.left = odds_of(0.5 * (beyond - square));
   if (best.together > rules.surely_bent)
     chosen.unnamed.alone = std::max(chosen.unnamed.alone, rules.certain_odds);
   else if (best.together > rules.most_together)

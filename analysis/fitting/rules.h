@@ -40,23 +40,18 @@ struct Rules {
 
   // Tests for a gap: shares of the level, whose sum keeps it.
 
-  /// Share of the test of the best single effect. Derivation: tests of a named effect have the most power, so that they
-  /// get what the tests of unnamed gaps leave.
+  /// Share of the test of the best single effect; the tests of unnamed gaps have equal parts of what it leaves (see
+  /// share_for_unnamed()). Convention: tests of a named effect have the most power, so that they get most.
   double share_for_effects = 0.8;
-  double share_for_facets = 0.05;      ///< Share of the test of all cells of one facet together. Convention.
-  double share_for_variations = 0.05;  ///< Share of the test of variations without a name. Convention.
-  double share_for_cells = 0.1;        ///< Share of the test of one cell of the map. Convention.
   /// Share of the test of pairs whose effects hide one another, on top of the level. Measurement: of 93 folders of own
   /// data none raises an alarm (tests/benchmarks/own_data.py), as the look at all pairs is paid for in full.
   double share_for_pairs = 0.1;
 
   // Limits of what the best hypothesis may leave before something without a name is supposed.
 
-  /// P-value of the map that it leaves. Convention: 0.3 %, three standard deviations.
+  /// Level of the largest cell that it leaves beyond the model error, among all cells. Convention: 0.3 %, three
+  /// standard deviations; of 30 cells one whose statistic squared is above 15.
   double remaining_level = 0.003;
-  /// Square of a cell's statistic beyond the model error. Derivation: one of 30 cells exceeds it
-  /// by chance in 0.3 % of experiments, as remaining_level has it.
-  double remaining_square = 15;
   /// Held-out gap that counts as one [nats a collision]. Convention: a twentieth of a nat is what a normal error of a
   /// third of its sd does.
   double least_remaining = 0.05;
@@ -79,10 +74,9 @@ struct Rules {
   double unnamed_beside = 0.03;
   /// Odds of none to a gap where nothing is left over. Convention: never certain beyond one in a hundred.
   double none_prior = 0.01;
-  /// Odds of none where a test decides against all that were fitted. Convention: as good as certain.
-  double certain_odds = 1e6;
-  /// Odds of none where too few trials cannot tell, or a pair gains suspiciously much. Derivation: even.
-  double even_odds = 1;
+  /// Odds of none where a test decides against all that were fitted, as good as certain; and where too few trials
+  /// cannot tell, or a pair gains suspiciously much. These are what the words mean: nothing is to be turned.
+  static constexpr double certain_odds = 1e6, even_odds = 1;
 
   // The answer.
 
@@ -119,6 +113,9 @@ struct Rules {
     return expected_gain == other.expected_gain && model_error == other.model_error && pair_prior == other.pair_prior &&
            most_hidden == other.most_hidden && seen_gain == other.seen_gain;
   }
+  /// Returns the share of each test of an unnamed gap: of one cell of the map, of all cells of a facet together, and of
+  /// variations.
+  double share_for_unnamed() const { return (1 - share_for_effects) / 3; }
   /// Returns the odds of something without a name below which a gap is explained.
   double most_odds_of_none() const { return (1 - least_at_work) / least_at_work; }
   /// Returns what an error of form leaves of a gain of one, or of each cell.
@@ -134,12 +131,8 @@ inline constexpr std::array named_rules{
     std::pair{"most_together", &Rules::most_together},
     std::pair{"surely_bent", &Rules::surely_bent},
     std::pair{"share_for_effects", &Rules::share_for_effects},
-    std::pair{"share_for_facets", &Rules::share_for_facets},
-    std::pair{"share_for_variations", &Rules::share_for_variations},
-    std::pair{"share_for_cells", &Rules::share_for_cells},
     std::pair{"share_for_pairs", &Rules::share_for_pairs},
     std::pair{"remaining_level", &Rules::remaining_level},
-    std::pair{"remaining_square", &Rules::remaining_square},
     std::pair{"least_remaining", &Rules::least_remaining},
     std::pair{"least_remaining_in_all", &Rules::least_remaining_in_all},
     std::pair{"remaining_errors", &Rules::remaining_errors},
@@ -147,8 +140,6 @@ inline constexpr std::array named_rules{
     std::pair{"unnamed_alone", &Rules::unnamed_alone},
     std::pair{"unnamed_beside", &Rules::unnamed_beside},
     std::pair{"none_prior", &Rules::none_prior},
-    std::pair{"certain_odds", &Rules::certain_odds},
-    std::pair{"even_odds", &Rules::even_odds},
     std::pair{"least_at_work", &Rules::least_at_work},
     std::pair{"set_share", &Rules::set_share},
     std::pair{"least_of_first", &Rules::least_of_first},

@@ -12,9 +12,13 @@ constexpr double reach = 1.7320508075688772;  // points at sqrt 3 sds have the n
 constexpr double bend_share = 1.0 / 18;       // (h^2 - 1) / (4 h^4) with h^2 = 3
 constexpr double rounding = 1e-14;            // of a variance
 // An edge of failure lies between two points of the lattice; each round divides what it lies in.
-constexpr int divisions = 4, parts_of_edge = 16;
-constexpr double next_to_nothing = 1e-5;   // a chance of failure, or a weight of cells
-constexpr double worth_states = 1e-3;      // a chance of failure for which states about the mean are asked, too
+constexpr int divisions = 8, parts_of_edge = 4;
+constexpr std::size_t about_an_edge =
+    3;  // points to either side of an edge from the mean, where other states have theirs
+constexpr double next_to_nothing = 1e-5;  // a chance of failure, or a weight of cells
+// A chance of failure at the mean state from which on states about it are asked, too, and one at which these count in
+// full.
+constexpr double worth_states = 1e-4, all_states = 2e-3;
 constexpr double almost_sure = 1 - 1e-12;  // a chance of failure
 constexpr double least_weight = 1e-10;     // of a cell that counts
 constexpr double infinite = std::numeric_limits<double>::infinity();
@@ -205,7 +209,7 @@ std::vector<typename BeliefStep<Most>::Line> BeliefStep<Most>::rough_lines(std::
   const std::size_t n = axis_.points.size();
   for (std::size_t p = 0; p < lattice_points(); p += n) {
     const std::size_t first = lattice_start(trial) + p;
-    Line& line = all.emplace_back(Line{trial, p, 1, mean, !stepper_.failed(first), {}});
+    Line& line = all.emplace_back(Line{trial, p, 1, false, mean, !stepper_.failed(first), {}});
     for (std::size_t i = 0; i + 1 < n; ++i)
       if (stepper_.failed(first + i) != stepper_.failed(first + i + 1))
         line.edges.push_back(0.5 * (axis_.points[i] + axis_.points[i + 1]));
@@ -228,14 +232,15 @@ std::vector<typename BeliefStep<Most>::Line> BeliefStep<Most>::lines(std::span<c
     std::vector<Line> rough = rough_lines(t, mean);
     const double chance = chance_of_failure(rough);
     if (chance > next_to_nothing) {
-      const bool about = chance > worth_states;
-      const auto add = [&](double weight, const Vector& from) {
-        for (std::size_t p = 0; p < lattice_points(); p += axis_.points.size()) fine.push_back({t, p, weight, from});
+      const bool about = chance > 0.5 * worth_states;  // roughly known
+      const auto add = [&](double weight, bool aside, const Vector& from) {
+        for (std::size_t p = 0; p < lattice_points(); p += axis_.points.size())
+          fine.push_back({t, p, weight, aside, from});
       };
-      add(about ? 1 - columns / spread : 1, mean);
+      add(about ? 1 - columns / spread : 1, false, mean);
       for (const Eigen::Index i : used_)
         for (const double sign : {1.0, -1.0})
-          if (about) add(0.5 / spread, mean + sign * std::sqrt(spread) * roots[t].col(i).head(size()));
+          if (about) add(0.5 / spread, true, mean + sign * std::sqrt(spread) * roots[t].col(i).head(size()));
     } else {
       std::ranges::move(rough, std::back_inserter(all));
     }
@@ -246,23 +251,49 @@ std::vector<typename BeliefStep<Most>::Line> BeliefStep<Most>::lines(std::span<c
   return all;
 }
 
-// Steps all lines and seeks the edges of failure on them, all together; those that hardly weigh are left between two
-// points.
+// Says of every point of the lines whether the machine goes on: of those from the mean as the lattice has it; of others
+// the points about the mean's edges are stepped.
+template <int Most>
+std::vector<char> BeliefStep<Most>::goes_on(const std::vector<Line>& lines, std::span<const TransitionPlace> places,
+                                            MachineStepper& stepper) const {
+  const std::size_t n = axis_.points.size();
+  std::vector<char> alive(lines.size() * n);
+  std::vector<std::size_t> asked;
+  stepper.clear();
+  for (std::size_t l = 0; l < lines.size(); ++l) {
+    const Line& line = lines[l];
+    char* here = alive.data() + l * n;
+    for (std::size_t i = 0; i < n; ++i) here[i] = !stepper_.failed(lattice_start(line.trial) + line.first + i);
+    std::vector<char> near(n);
+    for (std::size_t i = 0; i + 1 < n && line.about; ++i)
+      if (here[i] != here[i + 1])
+        for (std::size_t k = i - std::min(i, about_an_edge); k < std::min(n, i + 2 + about_an_edge); ++k) near[k] = 1;
+    for (std::size_t i = 0; i < n; ++i)
+      if (near[i]) {
+        stepper.add(places[line.trial], line.from, lattice_scores(line.first + i));
+        asked.push_back(l * n + i);
+      }
+  }
+  stepper.run();
+  for (std::size_t i = 0; i < asked.size(); ++i) alive[asked[i]] = !stepper.failed(i);
+  return alive;
+}
+
+// Seeks the edges of failure on all lines together; those that hardly weigh are left between two points.
 template <int Most>
 void BeliefStep<Most>::find_edges(std::vector<Line>& lines, std::span<const TransitionPlace> places) const {
   const std::size_t n = axis_.points.size();
   MachineStepper stepper = stepper_.another();
-  for (const Line& line : lines)
-    for (std::size_t i = 0; i < n; ++i) stepper.add(places[line.trial], line.from, lattice_scores(line.first + i));
-  stepper.run();
+  const std::vector<char> alive = goes_on(lines, places, stepper);
   std::vector<Edge> edges;
   for (std::size_t l = 0; l < lines.size(); ++l) {
-    lines[l].begins_alive = !stepper.failed(l * n);
+    const char* here = alive.data() + l * n;
+    lines[l].begins_alive = here[0] != 0;
     const double weight = plan_.lattice.size() > 1 ? axis_.weights[lines[l].first / n] : 1;
     for (std::size_t i = 0; i + 1 < n; ++i)
-      if (const bool alive = !stepper.failed(l * n + i); alive == stepper.failed(l * n + i + 1)) {
+      if (here[i] != here[i + 1]) {
         const bool counts = weight * std::max(axis_.weights[i], axis_.weights[i + 1]) > next_to_nothing;
-        edges.push_back({l, axis_.points[i], axis_.points[i + 1], alive, counts});
+        edges.push_back({l, axis_.points[i], axis_.points[i + 1], here[i] != 0, counts});
       }
   }
   for (int round = 0; round < divisions; ++round) divide(edges, lines, places, stepper);
@@ -295,21 +326,33 @@ void BeliefStep<Most>::divide(std::vector<Edge>& edges, const std::vector<Line>&
   }
 }
 
+// The chance of failure on a line, times the weight of the line among those of its state.
+template <int Most>
+double BeliefStep<Most>::chance_on(const Line& line) const {
+  if (line.edges.empty() && line.begins_alive) return 0;
+  const std::size_t n = axis_.points.size();
+  const std::vector<Interval> alive = line.alive();
+  double failed = 0;
+  for (std::size_t i = 0; i < n; ++i)
+    if (axis_.weights[i] > 0) failed += axis_.weights[i] * (1 - cell_part(axis_.points[i], axis_.spread, alive).mass);
+  return plan_.lattice.size() > 1 ? failed * axis_.weights[line.first / n] : failed;
+}
+
+// Goes over from the chance at the mean state to that over all states, so that no value jumps where these are asked.
 // @param lines  of one trial
 template <int Most>
 double BeliefStep<Most>::chance_of_failure(std::span<const Line> lines) const {
-  const std::size_t n = axis_.points.size();
-  double failed = 0;
+  double at_mean = 0, over_states = 0;
+  bool about = false;
   for (const Line& line : lines) {
-    if (line.edges.empty() && line.begins_alive) continue;
-    double others = line.weight;  // weight of the line among all
-    if (plan_.lattice.size() > 1) others *= axis_.weights[line.first / n];
-    const std::vector<Interval> alive = line.alive();
-    for (std::size_t i = 0; i < n; ++i)
-      if (axis_.weights[i] > 0)
-        failed += others * axis_.weights[i] * (1 - cell_part(axis_.points[i], axis_.spread, alive).mass);
+    const double chance = chance_on(line);
+    if (!line.about) at_mean += chance;
+    over_states += line.weight * chance;
+    about = about || line.about;
   }
-  return std::clamp(failed, 0.0, 1.0);
+  if (!about || !(at_mean > worth_states)) return std::clamp(at_mean, 0.0, 1.0);
+  const double share = std::clamp(std::log(at_mean / worth_states) / std::log(all_states / worth_states), 0.0, 1.0);
+  return std::clamp((1 - share) * at_mean + share * over_states, 0.0, 1.0);
 }
 
 // A cell is cut where its line fails; where its own point failed it takes the next state of the nearest that did not.

@@ -41,6 +41,7 @@ class BeliefStep {
   struct Line {
     std::size_t trial = 0, first = 0;  // of its points, of the trial's lattice
     double weight = 1;                 // of its state, among those from which the chance of failure is taken
+    bool about = false;                // not from the mean, but from a state about it
     Vector from = {};                  // its state, as MachineStepper's point
     bool begins_alive = true;
     std::vector<double> edges = {};  // where going on and failing meet, ascending
@@ -58,9 +59,12 @@ class BeliefStep {
   std::vector<Line> lines(std::span<const TransitionPlace> places, std::span<const Part> beliefs,
                           std::span<const Matrix> roots) const;
   std::vector<Line> rough_lines(std::size_t trial, const Vector& mean) const;
+  std::vector<char> goes_on(const std::vector<Line>& lines, std::span<const TransitionPlace> places,
+                            MachineStepper& stepper) const;
   void find_edges(std::vector<Line>& lines, std::span<const TransitionPlace> places) const;
   void divide(std::vector<Edge>& edges, const std::vector<Line>& lines, std::span<const TransitionPlace> places,
               MachineStepper& stepper) const;
+  double chance_on(const Line& line) const;
   double chance_of_failure(std::span<const Line> lines) const;
   Matrix first_differences(std::size_t at, const Vector* centre, Matrix* bend) const;
   Slopes slopes(std::size_t trial) const;

@@ -56,8 +56,7 @@ TEST(GapTests, WhatVariesWithoutANameIsAGap) {
 // The shares of the level add up to it, and pairs come on top.
 TEST(GapTests, SharesKeepTheLevel) {
   const Rules rules;
-  EXPECT_NEAR(rules.share_for_effects + rules.share_for_cells + rules.share_for_facets + rules.share_for_variations, 1,
-              1e-12);
+  EXPECT_NEAR(rules.share_for_effects + 3 * rules.share_for_unnamed(), 1, 1e-12);
 }
 
 }  // namespace

@@ -102,7 +102,7 @@ class Studies(unittest.TestCase):
                                   (dict(standard_errors={"mood": 1}), "mood")):
             with self.assertRaisesRegex(metastable.InputError, sentence):
                 metastable.study(setting, **options)
-        with self.assertRaisesRegex(TypeError, "a Setting, WalkerSetting or Walker expected, not int"):
+        with self.assertRaisesRegex(TypeError, "a Setting, WalkerSetting, Walker or Machine expected, not int"):
             metastable.study(3)
 
 
