@@ -11,8 +11,6 @@ namespace metastable::analysis {
 namespace {
 
 constexpr double half_log_two_pi = 0.91893853320467274178;
-constexpr double least_log_density = -1e5;  // of a value beyond reach
-constexpr double farthest_score = 37;       // probabilities beyond it are no doubles
 constexpr double nothing = -std::numeric_limits<double>::infinity();
 
 double log_sum(const std::vector<double>& logs) {
@@ -65,7 +63,7 @@ SeenValue BeliefMixture<Most>::see(const Look<Most>& look, double value, double 
   std::vector<double> logs;
   logs.reserve(parts_.size());
   const double mass = log_mass();
-  double below = failed, above = 0, lone = 0;
+  double below = failed, above = 0, lone = 0, widest = 0;
   for (Part& part : parts_) {
     const BeliefVector<Most> gain = part.covariance * look.weights;
     double variance = look.weights.dot(gain) + look.variance;
@@ -76,6 +74,7 @@ SeenValue BeliefMixture<Most>::see(const Look<Most>& look, double value, double 
     below += weight * dynamics::normal_cdf(z);
     above += weight * dynamics::normal_cdf(-z);
     lone = z;
+    widest = std::max(widest, sd);
     logs.push_back(part.log_weight - 0.5 * z * z - half_log_two_pi - std::log(sd));
     part.log_weight = logs.back();
     if (part.width > 1) continue;
@@ -84,16 +83,17 @@ SeenValue BeliefMixture<Most>::see(const Look<Most>& look, double value, double 
   }
   const double all = log_sum(logs);
   SeenValue seen;
-  seen.log_density = all - (failed > 0 ? 0 : mass);
+  seen.log_density = all - mass + std::log1p(-std::min(failed, 1 - 1e-12));
   seen.score =
       parts_.size() == 1 && failed == 0 ? std::clamp(lone, -farthest_score, farthest_score) : score_of(below, above);
   if (!(seen.log_density > least_log_density)) {
     seen.log_density = least_log_density;
     seen.score = below < above ? -farthest_score : farthest_score;
+    seen.unit = widest;
     for (Part& part : parts_) part.log_weight = -std::log(static_cast<double>(parts_.size()));
-  } else {
-    for (Part& part : parts_) part.log_weight -= all;
+    return seen;
   }
+  for (Part& part : parts_) part.log_weight -= all;
   seen.unit = std::exp(std::clamp(-0.5 * seen.score * seen.score - half_log_two_pi - seen.log_density, -50.0, 50.0));
   return seen;
 }

@@ -23,6 +23,9 @@ struct Look {
   double variance = 0;
 };
 
+inline constexpr double least_log_density = -1e5;  ///< of a value beyond reach
+inline constexpr double farthest_score = 37;       ///< probabilities beyond it are no doubles
+
 /// How likely a measured value was.
 struct SeenValue {
   double log_density = 0;

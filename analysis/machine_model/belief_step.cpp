@@ -104,20 +104,24 @@ void BeliefStep<Most>::add_points(const TransitionPlace& place, const Part& beli
     for (const double sign : {reach, -reach}) add_pairs(sign * unit(score));
 }
 
-// Where one of a pair failed, the slope is that of the other side.
+// Where one of a pair failed, the slope is that of the other side of the centre; where it is known, it says so.
 template <int Most>
-BeliefMatrix<Most> BeliefStep<Most>::first_differences(std::size_t at, const Vector* centre, Matrix* bend) const {
+BeliefMatrix<Most> BeliefStep<Most>::first_differences(std::size_t at, const Vector* centre, Matrix* bend,
+                                                       std::vector<char>* known) const {
   Matrix slope = Matrix::Zero(states(), static_cast<Eigen::Index>(pairs()));
   if (bend) *bend = slope;
+  if (known) known->assign(pairs(), 0);
   for (std::size_t i = 0; i < pairs(); ++i) {
     const bool lost_up = stepper_.failed(at + 2 * i), lost_down = stepper_.failed(at + 2 * i + 1);
-    const Vector up = stepper_.next(at + 2 * i), down = stepper_.next(at + 2 * i + 1);
     const auto column = static_cast<Eigen::Index>(i);
     if (!lost_up && !lost_down) {
+      const Vector up = stepper_.next(at + 2 * i), down = stepper_.next(at + 2 * i + 1);
       slope.col(column) = (up - down) / (2 * reach);
       if (bend && centre) bend->col(column) = up + down - 2 * *centre;
+      if (known) (*known)[i] = 1;
     } else if (centre && lost_up != lost_down) {
-      slope.col(column) = (lost_up ? *centre - down : up - *centre) / reach;
+      const Vector one = stepper_.next(at + 2 * i + (lost_up ? 1 : 0));
+      slope.col(column) = (lost_up ? Vector(*centre - one) : Vector(one - *centre)) / reach;
     }
   }
   return slope;
@@ -128,12 +132,23 @@ typename BeliefStep<Most>::Slopes BeliefStep<Most>::slopes(std::size_t trial) co
   const std::size_t first = trial * points_;
   Slopes s;
   s.centre = stepper_.next(first);
-  s.first = first_differences(first + 1, stepper_.failed(first) ? nullptr : &s.centre, &s.bend);
+  const bool lost = stepper_.failed(first);
+  if (lost) s.centre.setZero();  // a failed state is none
+  s.first = first_differences(first + 1, lost ? nullptr : &s.centre, &s.bend, nullptr);
   std::size_t at = lattice_start(trial) + lattice_points();
-  for (std::size_t b = 0; b < plan_.lattice.size(); ++b, at += 4 * pairs())
-    s.by_score.push_back(
-        (first_differences(at, nullptr, nullptr) - first_differences(at + 2 * pairs(), nullptr, nullptr)) /
-        (2 * reach));
+  for (std::size_t b = 0; b < plan_.lattice.size(); ++b, at += 4 * pairs()) {
+    std::vector<char> above, below;
+    const Matrix up = first_differences(at, nullptr, nullptr, &above);
+    const Matrix down = first_differences(at + 2 * pairs(), nullptr, nullptr, &below);
+    Matrix& change = s.by_score.emplace_back(Matrix::Zero(states(), static_cast<Eigen::Index>(pairs())));
+    for (std::size_t i = 0; i < pairs(); ++i) {
+      const auto c = static_cast<Eigen::Index>(i);
+      if (above[i] && below[i])
+        change.col(c) = (up.col(c) - down.col(c)) / (2 * reach);
+      else if (above[i] || below[i])
+        change.col(c) = (above[i] ? Vector(up.col(c) - s.first.col(c)) : Vector(s.first.col(c) - down.col(c))) / reach;
+    }
+  }
   return s;
 }
 
@@ -289,10 +304,10 @@ void BeliefStep<Most>::find_edges(std::vector<Line>& lines, std::span<const Tran
   for (std::size_t l = 0; l < lines.size(); ++l) {
     const char* here = alive.data() + l * n;
     lines[l].begins_alive = here[0] != 0;
-    const double weight = plan_.lattice.size() > 1 ? axis_.weights[lines[l].first / n] : 1;
+    const double share = plan_.lattice.size() > 1 ? axis_.shares[lines[l].first / n] : 1;
     for (std::size_t i = 0; i + 1 < n; ++i)
       if (here[i] != here[i + 1]) {
-        const bool counts = weight * std::max(axis_.weights[i], axis_.weights[i + 1]) > next_to_nothing;
+        const bool counts = share * std::max(axis_.shares[i], axis_.shares[i + 1]) > next_to_nothing;
         edges.push_back({l, axis_.points[i], axis_.points[i + 1], here[i] != 0, counts});
       }
   }
@@ -326,16 +341,12 @@ void BeliefStep<Most>::divide(std::vector<Edge>& edges, const std::vector<Line>&
   }
 }
 
-// The chance of failure on a line, times the weight of the line among those of its state.
+// The chance of failure on a line, times the share of the line among those of its state.
 template <int Most>
 double BeliefStep<Most>::chance_on(const Line& line) const {
   if (line.edges.empty() && line.begins_alive) return 0;
-  const std::size_t n = axis_.points.size();
-  const std::vector<Interval> alive = line.alive();
-  double failed = 0;
-  for (std::size_t i = 0; i < n; ++i)
-    if (axis_.weights[i] > 0) failed += axis_.weights[i] * (1 - cell_part(axis_.points[i], axis_.spread, alive).mass);
-  return plan_.lattice.size() > 1 ? failed * axis_.weights[line.first / n] : failed;
+  const double failed = std::max(0.0, 1 - cell_part(0, 1, line.alive()).mass);
+  return plan_.lattice.size() > 1 ? failed * axis_.shares[line.first / axis_.points.size()] : failed;
 }
 
 // Goes over from the chance at the mean state to that over all states, so that no value jumps where these are asked.
@@ -442,6 +453,8 @@ AfterStep<Most> BeliefStep<Most>::on_lattice(std::size_t trial, const Part& beli
   const double ratio = goes_on - std::log1p(-std::min(after.failed, almost_sure));
   for (Part& one : after.belief.parts()) one.log_weight += ratio;
   after.failed = failed;
+  const Line& middle = lines[plan_.lattice.size() > 1 ? axis_.points.size() / 2 : 0];  // the other score at zero
+  after.failed_wide = 1 - cell_part(0, outlier_width, middle.alive()).mass;
   return after;
 }
 

@@ -6,9 +6,9 @@
 #include <vector>
 
 #include "analysis/machine_model/belief_mixture.h"
-#include "analysis/machine_model/machine_filter.h"
 #include "analysis/machine_model/machine_stepper.h"
 #include "analysis/machine_model/score_lattice.h"
+#include "analysis/machine_model/score_plan.h"
 
 namespace metastable::analysis {
 
@@ -18,7 +18,8 @@ namespace metastable::analysis {
 template <int Most>
 struct AfterStep {
   BeliefMixture<Most> belief;
-  double failed = 0;  ///< probability that the machine failed; the weights add up to the rest
+  double failed = 0;       ///< probability that the machine failed; the weights add up to the rest
+  double failed_wide = 0;  ///< the same of an outlier's scores
 };
 
 /// Steps beliefs. A belief before a step holds the point and the errors of its row.
@@ -66,7 +67,7 @@ class BeliefStep {
               MachineStepper& stepper) const;
   double chance_on(const Line& line) const;
   double chance_of_failure(std::span<const Line> lines) const;
-  Matrix first_differences(std::size_t at, const Vector* centre, Matrix* bend) const;
+  Matrix first_differences(std::size_t at, const Vector* centre, Matrix* bend, std::vector<char>* known) const;
   Slopes slopes(std::size_t trial) const;
   Matrix columns(const Matrix& slope, const Matrix& root) const;
   Part part(const Slopes& slopes, const Part& belief, const Matrix& root) const;

@@ -73,6 +73,9 @@ void Machine::require_valid() const {
     throw std::invalid_argument(fmt::format("noise: {} is outside 1 to {}", scores, most_scores));
   require_distinct("states", states);
   require_distinct("parameters, effects and inputs", value_names());
+  for (const char* word : {"trial", "condition", "phase", "time_s", "position_m", "outcome"})
+    if (std::ranges::find(states, word) != states.end())
+      throw std::invalid_argument(fmt::format("states: \"{}\" is a word of the runs' own", word));
   for (const MachineParameter& p : parameters) require_parameter(p);
   std::vector<std::string> ids, observed;
   for (const MachineEffect& effect : effects) {

@@ -107,7 +107,7 @@ class Varying {
     one.candidate.variants.clear();
     for (std::size_t phase = 0; phase < std::max<std::size_t>(1, design_.phases.size()); ++phase)
       one.candidate.variants.push_back({static_cast<double>(phase)});
-    if (design_.phases.size() == 2)
+    if (design_.phases.size() == 2 && parameter_.sd > 0)
       one.candidate.variants.resize(1);  // the other differs by the same, and the nominal is fitted
     if (design_.phases.size() < 2) one.candidate.undecidable = "the runs have no column of phases with two of them";
     one.candidate.report = changed_in(design_.phases);
@@ -198,7 +198,7 @@ class Varying {
     one.candidate.variants.clear();
     for (std::size_t v = 0; v < std::max<std::size_t>(1, column.values.size()); ++v)
       one.candidate.variants.push_back({static_cast<double>(v)});
-    if (column.values.size() == 2) one.candidate.variants.resize(1);
+    if (column.values.size() == 2 && parameter_.sd > 0) one.candidate.variants.resize(1);
     if (column.values.size() < 2) one.candidate.undecidable = fmt::format("{} has one value", column.name);
     one.candidate.report = changed_in(column.values);
     one.apply = adding([label](const StepPlace& at, const Values& variant, std::size_t) {

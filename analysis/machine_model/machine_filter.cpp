@@ -13,7 +13,7 @@ namespace {
 
 constexpr double least_share = 1e-9;  // of a column's spread, that is taken for its error where there is none
 constexpr double least_chance = 1e-300;
-constexpr SeenValue out_of_reach{-1e5, 37, 1};
+constexpr SeenValue out_of_reach{least_log_density, farthest_score, 1};
 
 bool unseen(const MachineRow& row) {
   return std::ranges::all_of(row.seen, [](double x) { return std::isnan(x); });
@@ -44,6 +44,9 @@ class Follower {
  private:
   double spread_of(std::size_t sensor) const;
   double added_variance(std::size_t sensor) const;
+  double failed_in(const AfterStep<Most>& after) const {
+    return (1 - supposed_.outliers) * after.failed + supposed_.outliers * after.failed_wide;
+  }
   // A row that says nothing may be a failure, too.
   double tolerated(double chance) const { return supposed_.wild + (1 - supposed_.wild) * chance; }
   Part launched(const MachineRow& row) const;
@@ -149,7 +152,7 @@ void Follower<Most>::put(std::size_t event, const SeenValue& seen, double failed
 template <int Most>
 typename BeliefMixture<Most>::Part Follower<Most>::see(AfterStep<Most>& after, const MachineRow& row) {
   const Eigen::Index kept = static_cast<Eigen::Index>(stepper_.size()) + shared_count_;
-  double failed = plan_.failing ? tolerated(after.failed) : 0;
+  double failed = plan_.failing ? tolerated(failed_in(after)) : 0;
   std::size_t& event = cursor_[trial_];
   if (after.belief.parts().empty()) {  // it is sure to have failed, and did not
     for (const double x : row.seen)
@@ -164,7 +167,8 @@ typename BeliefMixture<Most>::Part Follower<Most>::see(AfterStep<Most>& after, c
     after.belief.add_wild(supposed_.wild, wild_width);
     for (std::size_t j = 0; j < state_.size(); ++j) {
       if (std::isnan(row.seen[j])) continue;
-      put(event++, after.belief.see(look(j, kept + shared_count_), row.seen[j], failed), failed > 0 ? after.failed : 0);
+      put(event++, after.belief.see(look(j, kept + shared_count_), row.seen[j], failed),
+          failed > 0 ? failed_in(after) : 0);
       failed = 0;
     }
   }
@@ -202,9 +206,9 @@ Evaluation Follower<Most>::follow(const std::vector<Event>& events, std::vector<
       if (k + 1 < trial.rows.size()) {
         beliefs[trial_] = see(after[i], trial.rows[k + 1]);
       } else {
-        const double chance = std::clamp(tolerated(after[i].failed), least_chance, 1.0);
+        const double chance = std::clamp(tolerated(failed_in(after[i])), least_chance, 1.0);
         const double score = dynamics::normal_quantile(std::clamp(0.5 * chance, least_chance, 0.5));
-        put(cursor_[trial_]++, {std::log(chance), score, 1}, after[i].failed);
+        put(cursor_[trial_]++, {std::log(chance), score, 1}, failed_in(after[i]));
       }
     }
   }
@@ -227,6 +231,7 @@ std::vector<Event> machine_events(const Machine& machine, const MachineRuns& run
       if (std::isfinite(row.position)) event.position = row.position;
       if (k > 0 && std::isfinite(row.time) && std::isfinite(trial.rows[k - 1].time))
         event.since_previous = row.time - trial.rows[k - 1].time;
+      event.speed = row.seen[0];
       const bool last = k + 1 == trial.rows.size();
       if (last || unseen(trial.rows[k + 1])) {
         event.kind = last ? EventKind::rest : EventKind::survival;

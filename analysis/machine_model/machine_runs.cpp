@@ -43,7 +43,8 @@ void require_shape(const Machine& machine, const MachineRuns& runs) {
                                                 machine.inputs.size()));
       if (std::ranges::any_of(row.seen, [](double x) { return std::isinf(x); }))
         throw std::invalid_argument(fmt::format("trial {}: a state is infinite", t + 1));
-      if (!std::ranges::all_of(row.inputs, [](double x) { return std::isfinite(x); }))
+      const bool steps = &row != &runs.trials[t].rows.back() || runs.trials[t].outcome == MachineOutcome::failed;
+      if (steps && !std::ranges::all_of(row.inputs, [](double x) { return std::isfinite(x); }))
         throw std::invalid_argument(fmt::format("trial {}: an input is not a finite number", t + 1));
     }
 }
@@ -60,7 +61,7 @@ void require_launch(const Machine& machine, const MachineRuns& runs) {
                       state));
     const auto j = static_cast<std::size_t>(sensor - machine.observe.begin());
     for (std::size_t t = 0; t < runs.trials.size(); ++t)
-      if (runs.trials[t].rows.size() > 1 && std::isnan(runs.trials[t].rows.front().seen[j]))
+      if (steps_of(runs.trials[t]) > 0 && std::isnan(runs.trials[t].rows.front().seen[j]))
         throw std::invalid_argument(
             fmt::format("launch: trial {} begins without {}, so that its first value has to be "
                         "given with its sd",

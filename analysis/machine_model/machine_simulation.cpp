@@ -5,6 +5,7 @@
 #include <cmath>
 #include <utility>
 
+#include "analysis/machine_model/machine_design.h"
 #include "analysis/machine_model/machine_stepper.h"
 #include "analysis/machine_model/shared_error.h"
 #include "analysis/statistics/random.h"
@@ -29,7 +30,17 @@ class Draws {
 };
 
 // What a number is drawn for; scores, sensors and offsets follow one another from these.
-enum Purpose : std::size_t { outlier, wild, scores, errors = 32, added = 96, offsets = 160, earlier = 200 };
+enum Purpose : std::size_t {
+  outlier,
+  wild,
+  scores,
+  errors = 32,
+  added = 64,
+  offsets = 96,
+  earlier = 128,
+  wild_error = 160,
+  launch = 192
+};
 
 // A trial under way.
 struct Walking {
@@ -41,12 +52,17 @@ struct Walking {
 class Walker {
  public:
   Walker(const Machine& machine, const MachineRuns& runs, const MachineHypothesis& supposed, std::uint64_t seed)
-      : machine_(machine), runs_(runs), supposed_(supposed), seed_(seed), stepper_(machine, runs_, supposed) {}
+      : machine_(machine),
+        runs_(runs),
+        supposed_(supposed),
+        seed_(seed),
+        stepper_(machine, runs_, supposed),
+        design_(machine_design(machine, runs)) {}
   MachineRuns walk();
 
  private:
   std::size_t planned(std::size_t trial) const;
-  const MachineRow& design_row(std::size_t trial, std::size_t row) const;
+  std::size_t design_row(std::size_t trial, std::size_t row) const;
   Walking launched(std::size_t trial) const;
   double error(std::size_t sensor, double now, double before) const;
   MachineRow seen(std::size_t trial, std::size_t row, Walking& walking) const;
@@ -56,16 +72,18 @@ class Walker {
   const MachineHypothesis& supposed_;
   std::uint64_t seed_;
   MachineStepper stepper_;
+  MachineDesign design_;
 };
 
 std::size_t Walker::planned(std::size_t trial) const {
   return runs_.trials[trial].outcome == MachineOutcome::failed ? runs_.longest() : runs_.trials[trial].rows.size();
 }
 
-// Rows beyond those that were measured are as the longest trial's.
-const MachineRow& Walker::design_row(std::size_t trial, std::size_t row) const {
-  if (row < runs_.trials[trial].rows.size()) return runs_.trials[trial].rows[row];
-  return std::ranges::max_element(runs_.trials, {}, [](const MachineTrial& t) { return t.rows.size(); })->rows[row];
+// Rows beyond those that were measured are as the last ones were, phase by phase: this is the row that one is like.
+std::size_t Walker::design_row(std::size_t trial, std::size_t row) const {
+  const std::size_t rows = runs_.trials[trial].rows.size(), period = std::max<std::size_t>(1, runs_.phases.size());
+  if (row < rows) return row;
+  return rows < period ? rows - 1 : row - period * ((row - rows) / period + 1);
 }
 
 double Walker::error(std::size_t sensor, double now, double before) const {
@@ -80,7 +98,7 @@ Walking Walker::launched(std::size_t trial) const {
                   Eigen::VectorXd::Zero(static_cast<Eigen::Index>(machine_.observe.size())), false};
   for (std::size_t l = 0; l < machine_.launches.size(); ++l)
     walking.point[static_cast<Eigen::Index>(machine_.state_index(machine_.launches[l].state))] =
-        machine_.launches[l].mean + machine_.launches[l].sd * draws.normal(0, earlier + l);
+        machine_.launches[l].mean + machine_.launches[l].sd * draws.normal(0, launch + l);
   for (std::size_t j = 0; j < machine_.observe.size(); ++j) {
     const auto at = static_cast<Eigen::Index>(j);
     walking.errors[at] = draws.normal(0, errors + j);
@@ -100,7 +118,9 @@ Walking Walker::launched(std::size_t trial) const {
 // What is seen of a row, with its errors and what is missing.
 MachineRow Walker::seen(std::size_t trial, std::size_t row, Walking& walking) const {
   const Draws draws(seed_, trial);
-  MachineRow out = design_row(trial, row);
+  const std::size_t like = design_row(trial, row);
+  MachineRow out = runs_.trials[trial].rows[like];
+  out.time += static_cast<double>(row - like) * design_.usual_gap;
   const bool is_wild = draws.uniform(row, wild) < supposed_.wild;
   for (std::size_t j = 0; j < machine_.observe.size(); ++j) {
     const auto at = static_cast<Eigen::Index>(j);
@@ -109,7 +129,8 @@ MachineRow Walker::seen(std::size_t trial, std::size_t row, Walking& walking) co
     if (std::isnan(out.seen[j])) continue;
     double off = error(j, walking.errors[at], before);
     if (!supposed_.added_noise.empty()) off += supposed_.added_noise[j] * draws.normal(row, added + j);
-    if (is_wild) off *= wild_width;
+    if (is_wild)
+      off = wild_width * std::hypot(design_.change[j], supposed_.sensor_sd[j]) * draws.normal(row, wild_error + j);
     if (!supposed_.bias.empty()) off += supposed_.bias[j];
     out.seen[j] = walking.point[static_cast<Eigen::Index>(machine_.state_index(machine_.observe[j].state))] + off;
   }
@@ -142,9 +163,8 @@ MachineRuns Walker::walk() {
       const double width = draws.uniform(k + 1, outlier) < supposed_.outliers ? outlier_width : 1;
       for (std::size_t m = 0; m < stepper_.scores(); ++m)
         fresh[static_cast<Eigen::Index>(m)] = width * draws.normal(k + 1, scores + m);
-      const std::size_t known = std::max<std::size_t>(1, steps_of(runs_.trials[t])) - 1;
-      const std::size_t row = std::min(k, runs_.trials[t].rows.size() - 1);
-      stepper_.add({t, row, first[t] + std::min(k, known)}, walking[t].point, fresh);
+      const std::size_t like = design_row(t, k);
+      stepper_.add({t, like, first[t] + like}, walking[t].point, fresh);
       for (std::size_t m = 0; stepper_.remembers() && m < stepper_.scores(); ++m) {
         double& before = walking[t].point[static_cast<Eigen::Index>(stepper_.states() + stepper_.offsets() + m)];
         const double kept = stepper_.memory(m);

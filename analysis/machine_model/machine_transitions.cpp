@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <set>
 #include <stdexcept>
 #include <utility>
 
@@ -34,8 +35,8 @@ class MachineTransitions : public TransitionModel {
     design_ = std::make_shared<MachineDesign>(machine_design(*machine_, runs_));
     set_up_nuisances();
     plan_ = score_plan(*machine_, runs_, hypothesis(nominal_values(*this), {}));
-    if (plan_.failing && plan_.lattice.size() > 1)
-      notes_.push_back("failures are sought along one of the noises; the others are held to a lattice");
+    if (plan_.others_fail)
+      notes_.push_back("more than two noises lead to failure: its chance leaves out all but two of them");
     set_up_effects();
     list_events();
     require_noise();
@@ -127,9 +128,11 @@ void MachineTransitions::set_up_nuisances() {
                           sensor_prior, 1e-3, std::log(least_sensor * change), std::log(change)});
     nuisances_.back().assumed = true;
   }
-  if (machine_->most_wild > 0)
-    nuisances_.push_back({"logit wild_share", usual_wild, wild_prior, 1e-2, least_wild,
-                          std::log(machine_->most_wild / (1 - machine_->most_wild))});
+  if (machine_->most_wild > 0) {
+    const double most = std::log(machine_->most_wild / (1 - machine_->most_wild));
+    nuisances_.push_back({"logit wild_share", std::min(usual_wild, most - wild_prior), wild_prior, 1e-2,
+                          std::min(least_wild, most - 2 * wild_prior), most});
+  }
 }
 
 void MachineTransitions::set_up_effects() {
@@ -137,6 +140,11 @@ void MachineTransitions::set_up_effects() {
   varied_ = machine_variations(*machine_, design_);
   for (const MachineCandidate& one : effects_) candidates_.push_back(one.candidate);
   for (const MachineVariation& one : varied_) variations_.push_back(one.variation);
+  std::set<std::string> ids;
+  for (const Candidate& one : candidates_)
+    if (!ids.insert(one.id).second)
+      throw std::invalid_argument(
+          fmt::format("effects: \"{}\" is the name of an effect that any machine may have, too", one.id));
 }
 
 MachineHypothesis MachineTransitions::hypothesis(std::span<const double> nuisance,
@@ -165,8 +173,12 @@ void MachineTransitions::require_noise() const {
   const Evaluation evaluation = evaluate(nominal_values(*this), {});
   for (std::size_t j = 0; j < machine_->observe.size(); ++j) {
     double most = 0;
+    const auto seen = [&](const Event& e) { return e.column == j && e.kind == EventKind::step; };
+    if (std::ranges::none_of(events_, seen))
+      throw std::invalid_argument(
+          fmt::format("runs: {} has no value after a trial's first row", machine_->observe[j].state));
     for (std::size_t e = 0; e < events_.size(); ++e)
-      if (events_[e].column == j && (events_[e].kind == EventKind::step)) most = std::max(most, evaluation.unit[e]);
+      if (seen(events_[e])) most = std::max(most, evaluation.unit[e]);
     if (!(most > seen_share * design_->change[j]))
       throw std::invalid_argument(
           fmt::format("sensor: {}: neither the machine's noise nor an error of measurement "
@@ -192,8 +204,15 @@ std::unique_ptr<MachineTransitions> MachineTransitions::drawn(std::span<const do
 
 double MachineTransitions::expected_steps(std::span<const double> nuisance, std::span<const EffectTerm> terms,
                                           std::uint64_t seed) const {
-  if (!plan_.failing) return std::numeric_limits<double>::infinity();
   const auto trials = drawn(nuisance, terms, seed);
+  if (!plan_.failing) {
+    double steps = 0, failed = 0;
+    for (const MachineTrial& trial : trials->runs_.trials) {
+      steps += static_cast<double>(steps_of(trial));
+      failed += trial.outcome == MachineOutcome::failed;
+    }
+    return failed > 0 ? steps / failed : std::numeric_limits<double>::infinity();
+  }
   const std::vector<double> chances = trials->rest_chances(nuisance, terms);
   double at_risk = 0, expected = 0;
   for (std::size_t e = 0; e < chances.size(); ++e)

@@ -40,18 +40,19 @@ std::vector<Facet> facets(const Machine& machine, const MachineDesign& design) {
     all.push_back({"phase", design.phases.size() - 1,
                    [](const StepPlace& at, std::size_t i) { return at.phase == static_cast<int>(i) ? 1.0 : 0.0; }});
   if (design.trials > 4)
-    all.push_back({"trial", 2 * waves, [](const StepPlace& at, std::size_t i) { return wave(at.run + 0.5, i); }});
+    all.push_back(
+        {"order of trials", 2 * waves, [](const StepPlace& at, std::size_t i) { return wave(at.run + 0.5, i); }});
   all.push_back({"step number", 2, [](const StepPlace& at, std::size_t i) {
                    return i == 0 ? 2 / std::sqrt(1.0 + at.number) : (at.number % 2 == 0 ? 1.0 : -1.0);
                  }});
   if (design.placed) {
     const double from = design.first_position, way = design.last_position - design.first_position;
-    all.push_back({"position", 4 * waves,
+    all.push_back({"place", 4 * waves,
                    [from, way](const StepPlace& at, std::size_t i) { return wave((at.position - from) / way, i); }});
   }
   if (design.timed) {
     const double from = design.first_time, whole = design.last_time - design.first_time;
-    all.push_back({"time", 4 * waves,
+    all.push_back({"clock", 4 * waves,
                    [from, whole](const StepPlace& at, std::size_t i) { return wave((at.time - from) / whole, i); }});
   }
   for (std::size_t l = 0; l < design.labels.size(); ++l)

@@ -1,5 +1,6 @@
 #include "analysis/machine_model/score_lattice.h"
 
+#include <algorithm>
 #include <cmath>
 
 #include "dynamics/numerics/truncated_normal.h"
@@ -21,14 +22,17 @@ LatticeAxis lattice_axis(int axes) {
   const double variance = 1 - axis.spread * axis.spread;
   const int half =
       static_cast<int>(std::ceil((axes > 1 ? coarse_reach : fine_reach) * std::sqrt(variance) / axis.spacing)) + 1;
-  double sum = 0;
+  double sum = 0, whole = 0;
   for (int i = -half; i <= half; ++i) {
     axis.points.push_back(i * axis.spacing);
     const double weight = std::abs(i) == half ? 0 : std::exp(-0.5 * axis.points.back() * axis.points.back() / variance);
     axis.weights.push_back(weight);
     sum += weight;
+    axis.shares.push_back(dynamics::normal_density(axis.points.back()));
+    whole += axis.shares.back();
   }
   for (double& weight : axis.weights) weight /= sum;
+  for (double& share : axis.shares) share /= whole;
   return axis;
 }
 

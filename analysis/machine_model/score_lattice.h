@@ -15,6 +15,7 @@ struct LatticeAxis {
   double spread = 0, spacing = 0;
   std::vector<double> points;   ///< ascending
   std::vector<double> weights;  ///< of the cells, 0 for the first and the last; they add up to 1
+  std::vector<double> shares;   ///< of the points, by which a mean over the standard normal is taken; they add up to 1
 };
 
 /// @param axes  of the lattice: the more, the coarser they are, 1 or 2

@@ -7,6 +7,7 @@
 #include <cmath>
 #include <numeric>
 #include <stdexcept>
+#include <utility>
 
 #include "analysis/machine_model/machine_stepper.h"
 
@@ -21,6 +22,7 @@ constexpr std::size_t on_a_lattice = 2;
 // What is told of each score: the largest share of its slope by which it bends, and how often it leads to failure.
 struct Told {
   std::vector<double> bends, fails;
+  bool ever = false;  // some point failed
 };
 
 // The measured states, those that were not measured at their launch's mean, or else at the mean of their column.
@@ -93,7 +95,33 @@ void look(Told& told, const MachineStepper& stepper, std::size_t first, const st
     }
   }
   for (std::size_t m = 0; m < scores; ++m)
-    for (std::size_t z = 0; z < 4; ++z) told.fails[m] += stepper.failed(first + 1 + 4 * m + z) != stepper.failed(first);
+    for (std::size_t z = 0; z < 4; ++z) {
+      told.fails[m] += stepper.failed(first + 1 + 4 * m + z) != stepper.failed(first);
+      told.ever = told.ever || stepper.failed(first + 1 + 4 * m + z);
+    }
+}
+
+// Scores that fail come first, then those that bend most.
+ScorePlan planned(const Told& told, bool failed) {
+  ScorePlan plan;
+  const auto most = std::ranges::max_element(told.fails);
+  if (failed || told.ever || *most > 0) {
+    plan.failing = static_cast<std::size_t>(most - told.fails.begin());
+    plan.lattice.push_back(*plan.failing);
+  }
+  std::vector<std::size_t> order(told.bends.size());
+  std::iota(order.begin(), order.end(), std::size_t{0});
+  std::ranges::stable_sort(order, [&](std::size_t a, std::size_t b) {
+    return std::pair(told.fails[a], told.bends[a]) > std::pair(told.fails[b], told.bends[b]);
+  });
+  for (const std::size_t m : order) {
+    if (plan.failing == m || !(told.fails[m] > 0 || told.bends[m] > straight_share)) continue;
+    if (plan.lattice.size() < on_a_lattice)
+      plan.lattice.push_back(m);
+    else
+      plan.others_fail = plan.others_fail || told.fails[m] > 0;
+  }
+  return plan;
 }
 
 }  // namespace
@@ -111,28 +139,27 @@ ScorePlan score_plan(const Machine& machine, const MachineRuns& runs, const Mach
   for (std::size_t i = 0; i < states.size(); ++i)
     for (std::size_t s = 0; s < scale.size(); ++s)
       scale[s] = std::max(scale[s], std::abs(states[i][static_cast<Eigen::Index>(s)]));
-  Told told{std::vector<double>(scores), std::vector<double>(scores)};
+  Told told{std::vector<double>(scores), std::vector<double>(scores), false};
+  std::size_t went_on = 0, lost = 0, last_lost = 0;
   for (std::size_t i = 0; i < states.size(); ++i) {
     if (stepper.lost(i * tried.size()))
       throw std::invalid_argument(
           fmt::format("step: no finite state comes of trial {}, row {}", places[i].trial + 1, places[i].row + 1));
     look(told, stepper, i * tried.size(), scale);
+    if (places[i].row + 1 == runs.trials[places[i].trial].rows.size()) continue;
+    ++went_on;
+    if (!stepper.failed(i * tried.size())) continue;
+    ++lost;
+    last_lost = i;
   }
-  ScorePlan plan;
-  std::vector<std::size_t> order(scores);
-  std::iota(order.begin(), order.end(), std::size_t{0});
-  const bool failed = std::ranges::any_of(
-      runs.trials, [](const MachineTrial& trial) { return trial.outcome == MachineOutcome::failed; });
-  const auto most = std::ranges::max_element(told.fails);
-  if (failed || *most > 0) {
-    plan.failing = static_cast<std::size_t>(most - told.fails.begin());
-    plan.lattice.push_back(*plan.failing);
-  }
-  std::ranges::stable_sort(order, [&](std::size_t a, std::size_t b) { return told.bends[a] > told.bends[b]; });
-  for (const std::size_t m : order)
-    if (told.bends[m] > straight_share && plan.lattice.size() < on_a_lattice && plan.failing != m)
-      plan.lattice.push_back(m);
-  return plan;
+  if (2 * lost > went_on)
+    throw std::invalid_argument(
+        fmt::format("step: fails without noise from {} of {} rows that went on, as from trial {}, "
+                    "row {}",
+                    lost, went_on, places[last_lost].trial + 1, places[last_lost].row + 1));
+  return planned(told, std::ranges::any_of(runs.trials, [](const MachineTrial& trial) {
+                   return trial.outcome == MachineOutcome::failed;
+                 }));
 }
 
 }  // namespace metastable::analysis

@@ -16,11 +16,13 @@ namespace metastable::analysis {
 struct ScorePlan {
   std::vector<std::size_t> lattice;
   std::optional<std::size_t> failing;
+  bool others_fail = false;  ///< scores that are taken as straight lead to failure, too
 };
 
 /// Finds out where the map bends by more than one part in a thousand of its slope, at every measured row, and whether
 /// it fails within four and a half sds of its scores or did fail.
-/// @throws std::invalid_argument where the map returns no finite state from a measured row
+/// @throws std::invalid_argument where the map returns no finite state from a measured row, and where it fails at zero
+///   scores from most rows that went on
 ScorePlan score_plan(const Machine& machine, const MachineRuns& runs, const MachineHypothesis& nominal);
 
 }  // namespace metastable::analysis

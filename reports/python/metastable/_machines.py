@@ -101,6 +101,8 @@ def _column(data, name):
 
 
 def _floats(values, name, rows):
+    if numpy.ma.isMaskedArray(values):
+        raise TypeError(f"{name}: a masked array is given: fill what is missing with NaN")
     try:
         array = numpy.asarray(values, float)
     except (TypeError, ValueError):
@@ -142,7 +144,11 @@ class Runs:
         if trial is None:
             raise InputError("runs: there is no column trial")
         rows = len(trial)
-        index = self._in_order(trial, rows)
+        condition, conditions = ((numpy.zeros(rows, int), ["all"]) if find("condition") is None
+                                 else _ranked(find("condition"), "condition", rows))
+        if rows and condition.min() < 0:
+            raise InputError(f"condition: row {int(condition.argmin()) + 1} has none")
+        index = self._in_order(trial, condition, rows)
         self.trials = int(index.max()) + 1 if rows else 0
         seen = []
         for state in machine.sensor:
@@ -153,8 +159,6 @@ class Runs:
         optional = {name: numpy.full(rows, math.nan) if find(name) is None else _floats(find(name), name, rows)
                     for name in ("time_s", "position_m")}
         phase, phases = (numpy.full(rows, -1), []) if find("phase") is None else _ranked(find("phase"), "phase", rows)
-        condition, conditions = ((numpy.zeros(rows, int), ["all"]) if find("condition") is None
-                                 else _ranked(find("condition"), "condition", rows))
         label_index, label_values = [], {}
         for name in _words(labels if not isinstance(labels, dict) else labels.keys(), "labels"):
             values = labels[name] if isinstance(labels, dict) else _column(data, name)
@@ -171,6 +175,7 @@ class Runs:
             given_inputs.append(_floats(values, name, rows))
         first = numpy.array([numpy.argmax(index == t) for t in range(self.trials)], int)
         self.rows = rows
+        self._columns = tuple(machine.sensor), machine.inputs
         self._laid_out = dict(
             trial=index, seen=numpy.column_stack(seen) if rows else numpy.zeros((0, len(seen))),
             time=optional["time_s"], position=optional["position_m"], phase=phase, phases=phases,
@@ -180,23 +185,30 @@ class Runs:
             outcome=self._outcomes(find("outcome") if outcome is None else outcome, numpy.asarray(trial)[first] if rows else []))
 
     @staticmethod
-    def _in_order(trial, rows):
-        """Numbers trials in the order in which they come; the rows of one stand together."""
+    def _in_order(trial, condition, rows):
+        """Numbers trials, those of each condition by themselves, in the order in which they come; the rows of one stand
+        together."""
         seen, index = {}, numpy.zeros(rows, int)
         before = None
-        for at, name in enumerate(numpy.asarray(trial).tolist()):
-            if name != before and name in seen:
-                raise InputError(f"trial: the rows of trial {name} do not stand together: rows come in the order they were "
-                                 "taken, trial by trial")
-            index[at] = seen.setdefault(name, len(seen))
-            before = name
+        for at, key in enumerate(zip(condition.tolist(), numpy.asarray(trial).tolist())):
+            if key[1] is None or key[1] != key[1]:
+                raise InputError(f"trial: row {at + 1} has none")
+            if key != before and key in seen:
+                raise InputError(f"trial: the rows of trial {key[1]} do not stand together: rows come in the order they "
+                                 "were taken, trial by trial")
+            index[at] = seen.setdefault(key, len(seen))
+            before = key
         return index
 
     def _outcomes(self, outcome, names):
         if outcome is None:
             return [None] * self.trials
         if isinstance(outcome, dict):
-            return [outcome.get(name.item() if hasattr(name, "item") else name) for name in names]
+            known = [name.item() if hasattr(name, "item") else name for name in names]
+            unknown = [key for key in outcome if key not in known]
+            if unknown:
+                raise InputError(f"outcome: {unknown[0]!r} is no trial")
+            outcome = [outcome.get(name) for name in known]
         values = [None if one is None or one != one else str(one) for one in
                   (outcome.tolist() if hasattr(outcome, "tolist") else list(outcome))]
         if len(values) == self.trials:

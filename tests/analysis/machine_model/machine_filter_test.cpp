@@ -7,10 +7,12 @@
 #include <Eigen/Dense>
 #include <algorithm>
 #include <cmath>
+#include <numbers>
 #include <vector>
 
 #include "dynamics/numerics/truncated_normal.h"
 #include "tests/analysis/machine_model/machines.h"
+#include "tests/message_of.h"
 
 namespace metastable::analysis::test {
 namespace {
@@ -148,6 +150,51 @@ TEST(MachineFilter, FailureHasTheProbabilityOfTheScoresThatFail) {
     EXPECT_NEAR(evaluation.log_density[e], std::log(chance), 1e-6);
   }
   EXPECT_EQ(failed, 4);
+}
+
+// Two noises in which the map is straight lead to failure together; failed states are NaN, as simulators have them.
+TEST(MachineFilter, FailureKnowsEveryNoiseThatLeadsToIt) {
+  Machine machine = linear_machine(0.02);
+  machine.scores = 2;
+  machine.parameters = {{"edge", 3, 0.1}};
+  machine.effects.clear();
+  machine.may_vary.clear();
+  machine.step = [](const MachineBatch& batch) {
+    for (std::size_t i = 0; i < batch.rows; ++i) {
+      const double next = batch.states[i] / 2 + batch.scores[2 * i] + batch.scores[2 * i + 1];
+      batch.failed[i] = std::abs(next) > batch.value(0, i);
+      batch.next[i] = batch.failed[i] ? missing : next;
+    }
+  };
+  MachineRuns runs = scalar_runs(10, 6, 0.0, 0.02, 5, [](double x, double z, std::size_t) { return x / 2 + z; });
+  for (MachineTrial& trial : runs.trials)
+    for (MachineRow& row : trial.rows) row.seen[0] = std::clamp(row.seen[0], -2.9, 2.9);
+  runs.trials[0].rows[0].seen[0] = 0;
+  const MachineHypothesis h = nominal_of(machine);
+  const ScorePlan plan = score_plan(machine, runs, h);
+  EXPECT_EQ(plan.lattice.size(), 2u);
+  const std::vector<Event> events = machine_events(machine, runs, plan);
+  std::vector<double> chances;
+  const Evaluation evaluation = follow_machine(machine, runs, plan, events, h, &chances);
+  for (std::size_t e = 0; e < events.size(); ++e) {
+    const double middle = events[e].speed / 2, sd = std::sqrt(2 + 0.01 * 0.01);
+    const double exact = dynamics::normal_cdf((-3 - middle) / sd) + dynamics::normal_cdf((middle - 3) / sd);
+    EXPECT_NEAR(chances[e], exact, 0.02 * exact) << e;
+    EXPECT_GT(evaluation.log_density[e], -20) << e;
+  }
+}
+
+TEST(MachineFilter, AMapThatFailsWhereTheMachineGoesOnIsRefused) {
+  Machine machine = linear_machine(0.05);
+  const auto goes_on = machine.step;
+  machine.step = [goes_on](const MachineBatch& batch) {
+    goes_on(batch);
+    std::ranges::fill(batch.failed, std::uint8_t{1});  // what is alive is said to have failed
+  };
+  const MachineRuns runs =
+      scalar_runs(5, 12, 1.0, 0.1, 3, [](double x, double z, std::size_t) { return 0.8 * x + 0.3 + 0.2 * z; });
+  EXPECT_EQ(message_of([&] { score_plan(machine, runs, nominal_of(machine)); }),
+            "step: fails without noise from 55 of 55 rows that went on, as from trial 5, row 11");
 }
 
 }  // namespace

@@ -157,6 +157,16 @@ class Refused(unittest.TestCase):
         self.check("outcome: \"fell\" is none of failed, stopped, lost", lambda: metastable.diagnose(
             metastable.runs(machine, outcome=["fell"] * 5, **data), machine))
         self.check("runs of a machine are given with it", lambda: metastable.diagnose(few), TypeError)
+        self.check("condition: row 2 has none", lambda: metastable.runs(machine, trial=[1, 1], swing_rad=[0.8, 0.7], condition=["a", None]))
+        self.check("trial: row 2 has none", lambda: metastable.runs(machine, trial=[1, np.nan], swing_rad=[0.8, 0.7]))
+        self.check("outcome: 7 is no trial", lambda: metastable.runs(machine, trial=[1, 1], swing_rad=[0.8, 0.7], outcome={7: "failed"}))
+        self.check("a masked array is given", lambda: metastable.runs(
+            machine, trial=[1, 1], swing_rad=np.ma.masked_equal([0.8, 0.7], 0.7)), TypeError)
+        self.check("a machine with other columns", lambda: metastable.diagnose(
+            few, metastable.machine(step, states=["angle"], noise=1, parameters=dict(machine.parameters))))
+        self.check("states: \"phase\" is a word of the runs' own", lambda: pendulum(states=["phase"], sensor={"phase": 0.1}))
+        self.check("effects: \"memory\" is the name of an effect that any machine may have", lambda: diagnosed(
+            pendulum(effects={"memory": {"loss_rad": (0, 0, 0.05)}, "quadratic_drag": {"per_rad": (0, 0, 0.5)}}), trials=5))
 
     def test_other_units_are_suspected_aloud(self):
         machine, data = pendulum(), swung(trials=10)
