@@ -12,6 +12,7 @@
 #include "analysis/walkers/walker_study.h"
 #include "analysis/walkers/walker_trials.h"
 #include "markov/mesh/batch_simulation.h"
+#include "markov/parallel.h"
 #include "reports/command_line/requests.h"
 #include "reports/command_line/walker_options.h"
 #include "reports/commands/walker_command.h"
@@ -243,7 +244,13 @@ py::tuple step_walkers(const py::dict& fields,
   }
   std::vector<double> to(from.size());
   std::vector<std::uint8_t> fell(who.size());
-  map.walker().step(from, grounds, to, fell);
+  constexpr std::size_t block = 64;  // walkers
+  markov::parallel_for((who.size() + block - 1) / block, 0, [&](std::size_t b) {
+    const std::size_t first = b * block, count = std::min(block, who.size() - first);
+    map.walker().step(std::span<const double>(from).subspan(first * d, count * d),
+                      std::span<const dynamics::Ground>(grounds).subspan(first, count),
+                      std::span(to).subspan(first * d, count * d), std::span(fell).subspan(first, count));
+  });
   for (std::size_t k = 0; k < who.size(); ++k) {
     failed[who[k]] = fell[k];
     std::copy_n(to.data() + k * d, d, next.data() + who[k] * d);
