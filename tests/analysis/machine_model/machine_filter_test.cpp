@@ -17,15 +17,6 @@
 namespace metastable::analysis::test {
 namespace {
 
-MachineHypothesis nominal_of(const Machine& machine) {
-  MachineHypothesis h;
-  for (const MachineParameter& p : machine.parameters) h.values.push_back(p.nominal);
-  for (const MachineEffect& effect : machine.effects)
-    for (const SuspectedParameter& p : effect.parameters) h.values.push_back(p.neutral);
-  for (const MachineSensor& sensor : machine.observe) h.sensor_sd.push_back(sensor.sd.value_or(0));
-  return h;
-}
-
 Evaluation followed(const Machine& machine, const MachineRuns& runs, const MachineHypothesis& h) {
   const ScorePlan plan = score_plan(machine, runs, h);
   return follow_machine(machine, runs, plan, machine_events(machine, runs, plan), h);
@@ -83,18 +74,6 @@ TEST(MachineFilter, IsTheExactLikelihoodOfALinearMachine) {
     for (const MachineTrial& trial : runs.trials) exact += exact_log_density(trial, 0.8, 0.3, 0.2, 0.1, correlation);
     EXPECT_NEAR(followed(machine, runs, nominal_of(machine)).total(), exact, 1e-9 * std::abs(exact)) << correlation;
   }
-}
-
-// Distance of scores from the standard normal, times the root of their number.
-double kolmogorov(std::vector<double> scores) {
-  std::ranges::sort(scores);
-  const auto n = static_cast<double>(scores.size());
-  double most = 0;
-  for (std::size_t i = 0; i < scores.size(); ++i) {
-    const double p = dynamics::normal_cdf(scores[i]);
-    most = std::max({most, std::abs(p - static_cast<double>(i) / n), std::abs(p - static_cast<double>(i + 1) / n)});
-  }
-  return most * std::sqrt(n);
 }
 
 Machine skewed_machine(double error) {

@@ -1,6 +1,7 @@
 #pragma once
 // Machines that the tests bring, and runs of them.
 
+#include <algorithm>
 #include <cmath>
 #include <limits>
 #include <random>
@@ -8,7 +9,9 @@
 #include <vector>
 
 #include "analysis/machine_model/machine.h"
+#include "analysis/machine_model/machine_hypothesis.h"
 #include "analysis/machine_model/machine_runs.h"
+#include "dynamics/numerics/truncated_normal.h"
 
 namespace metastable::analysis::test {
 
@@ -50,6 +53,28 @@ MachineRuns scalar_runs(std::size_t trials, std::size_t rows, double first, doub
     trial.outcome = MachineOutcome::stopped;
   }
   return runs;
+}
+
+/// Supposes what the machine states.
+inline MachineHypothesis nominal_of(const Machine& machine) {
+  MachineHypothesis h;
+  for (const MachineParameter& p : machine.parameters) h.values.push_back(p.nominal);
+  for (const MachineEffect& effect : machine.effects)
+    for (const SuspectedParameter& p : effect.parameters) h.values.push_back(p.neutral);
+  for (const MachineSensor& sensor : machine.observe) h.sensor_sd.push_back(sensor.sd.value_or(0));
+  return h;
+}
+
+/// Returns the distance of scores from the standard normal, times the root of their number.
+inline double kolmogorov(std::vector<double> scores) {
+  std::ranges::sort(scores);
+  const auto n = static_cast<double>(scores.size());
+  double most = 0;
+  for (std::size_t i = 0; i < scores.size(); ++i) {
+    const double p = dynamics::normal_cdf(scores[i]);
+    most = std::max({most, std::abs(p - static_cast<double>(i) / n), std::abs(p - static_cast<double>(i + 1) / n)});
+  }
+  return most * std::sqrt(n);
 }
 
 }  // namespace metastable::analysis::test

@@ -1,0 +1,83 @@
+// Runs that are drawn under a hypothesis have normal scores under it: simulation and likelihood mean the same.
+
+#include "analysis/machine_model/machine_simulation.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <memory>
+#include <vector>
+
+#include "analysis/machine_model/machine_design.h"
+#include "analysis/machine_model/machine_effects.h"
+#include "analysis/machine_model/machine_filter.h"
+#include "analysis/machine_model/machine_variations.h"
+#include "tests/analysis/machine_model/machines.h"
+
+namespace metastable::analysis::test {
+namespace {
+
+MachineRuns measured() {
+  MachineRuns runs =
+      scalar_runs(150, 25, 1.0, 0.1, 3, [](double x, double z, std::size_t) { return 0.8 * x + 0.3 + 0.2 * z; });
+  runs.phases = {"left", "right"};
+  for (MachineTrial& trial : runs.trials)
+    for (std::size_t k = 0; k < trial.rows.size(); ++k) trial.rows[k].phase = static_cast<int>(k % 2);
+  return runs;
+}
+
+TEST(MachineSimulation, DrawnRunsHaveNormalScores) {
+  const Machine machine = linear_machine(0.1, -0.5);
+  const MachineRuns runs = measured();
+  MachineHypothesis h = nominal_of(machine);
+  const ScorePlan plan = score_plan(machine, runs, h);
+  h.memory = {0.4};
+  h.spreads = {{1, 0.1}};
+  h.bias = {0.2};
+  h.added_noise = {0.05};
+  h.scatter.assign(runs.trials.size() * 25, 1.0);
+  for (std::size_t i = 0; i < h.scatter.size(); i += 2) h.scatter[i] = 2;
+  const MachineRuns drawn = simulate_machine(machine, runs, h, 9);
+  const Evaluation evaluation = follow_machine(machine, drawn, plan, machine_events(machine, drawn, plan), h);
+  ASSERT_EQ(evaluation.score.size(), 150u * 24);
+  EXPECT_LT(kolmogorov(evaluation.score), 1.63);  // 1 % of normal samples exceed it
+  double next = 0, square = 0;
+  for (std::size_t i = 1; i < evaluation.score.size(); ++i) next += evaluation.score[i] * evaluation.score[i - 1];
+  for (const double score : evaluation.score) square += score * score;
+  EXPECT_LT(std::abs(next), 3.3 * std::sqrt(3600.0));               // successive scores know nothing of each other
+  EXPECT_LT(std::abs(square - 3600), 3.3 * std::sqrt(2 * 3600.0));  // nor are they wider or narrower
+}
+
+TEST(MachineSimulation, ATrialThatOutlivesItsOriginalGoesOnPhaseByPhase) {
+  MachineRuns runs = measured();
+  const Machine machine = linear_machine(0.1);
+  runs.trials[2].rows.resize(4);
+  runs.trials[2].outcome = MachineOutcome::failed;
+  const MachineTrial drawn = simulate_machine(machine, runs, nominal_of(machine), 1).trials[2];
+  ASSERT_EQ(drawn.rows.size(), 25u);
+  EXPECT_EQ(drawn.outcome, MachineOutcome::stopped);
+  for (std::size_t k = 0; k < drawn.rows.size(); ++k) EXPECT_EQ(drawn.rows[k].phase, static_cast<int>(k % 2)) << k;
+}
+
+// No effect that these runs can show, and no variation, leaves the reach of the likelihood.
+TEST(MachineSimulation, EveryEffectHasALikelihood) {
+  const Machine machine = linear_machine(0.1);
+  const MachineRuns runs = measured();
+  const MachineHypothesis nominal = nominal_of(machine);
+  const ScorePlan plan = score_plan(machine, runs, nominal);
+  const std::vector<Event> events = machine_events(machine, runs, plan);
+  const auto design = std::make_shared<MachineDesign>(machine_design(machine, runs));
+  const auto check = [&](const auto& one, const Candidate& candidate) {
+    if (!candidate.undecidable.empty()) return;
+    std::vector<double> values;
+    for (const FreeParameter& p : candidate.parameters) values.push_back(p.neutral + 10 * p.step);
+    MachineHypothesis h = nominal;
+    one.apply(h, candidate.variants.front(), values);
+    EXPECT_GT(follow_machine(machine, runs, plan, events, h).total(), -1e5) << candidate.id;
+  };
+  for (const MachineCandidate& one : machine_effects(machine, design)) check(one, one.candidate);
+  for (const MachineVariation& one : machine_variations(machine, design)) check(one, one.variation.candidate);
+}
+
+}  // namespace
+}  // namespace metastable::analysis::test
