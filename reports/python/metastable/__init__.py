@@ -167,7 +167,8 @@ class WalkerSetting:
 
         The suspected effect is impact_loss, a share of the energy that a strike takes beyond the plastic one; the mean
         slope may vary by phase, run, clock, place, state and label. The ground is one plane that tilts anew at every
-        step (terrain "fresh").
+        step (terrain "fresh"). Sixty walks of 15 steps are diagnosed in some ten seconds; where most walks end in a
+        fall it takes many minutes.
         """
         if self.terrain != "fresh":
             raise InputError(f"terrain: '{self.terrain}' is no machine's: only fresh is")
