@@ -355,7 +355,7 @@ std::pair<Verdict, Diagnosis::Causes> name_causes(const TransitionModel& model, 
   return {named.verdict, std::move(causes)};
 }
 
-// What the rules decide, with what the rest of the answer is made from.
+// The part of an answer that depends on the rules, with the fits from which the rest of the answer is made.
 struct Decided {
   Diagnosis d;  // data, gap, causes, verdict; visible effects and measures of the shrinkage
   Hypotheses ranked;

@@ -264,8 +264,8 @@ double ChanceGains::p_value(const Candidate* effect, double gain) const {
   throw std::invalid_argument("ChanceGains::p_value: the effect was not scanned");
 }
 
-// What a prior holds may gain next to nothing by chance, and a gain that is no gain would stand out: its p-value is no
-// less than that of one free parameter.
+// An effect that a narrow prior holds near its neutral value gains almost nothing by chance, so that even a negligible
+// gain would look significant. Its p-value is therefore at least the chi-squared one of a single free parameter.
 double ChanceGains::ByChance::p_value(double gain) const {
   return held ? std::max(drawn_p_value(gain), std::erfc(std::sqrt(0.5 * std::max(0.0, gain)))) : drawn_p_value(gain);
 }

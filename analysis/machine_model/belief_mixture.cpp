@@ -36,7 +36,7 @@ double BeliefMixture<Most>::log_mass() const {
   return log_sum(logs);
 }
 
-// Adds the mixture as one normal; the other parts give way to it.
+// Adds the mixture's own mean and covariance as one more part, and scales the weights of the others down.
 template <int Most>
 typename BeliefMixture<Most>::Part& BeliefMixture<Most>::give_way(double share) {
   Part one = collapsed();

@@ -104,7 +104,8 @@ void BeliefStep<Most>::add_points(const TransitionPlace& place, const Part& beli
     for (const double sign : {reach, -reach}) add_pairs(sign * unit(score));
 }
 
-// Where one of a pair failed, the slope is that of the other side of the centre; where it is known, it says so.
+// A slope is the central difference of a pair of points. If one of the two failed, the one-sided difference to the
+// centre replaces it; `known` marks the pairs of which neither failed.
 template <int Most>
 BeliefMatrix<Most> BeliefStep<Most>::first_differences(std::size_t at, const Vector* centre, Matrix* bend,
                                                        std::vector<char>* known) const {
@@ -208,7 +209,7 @@ std::vector<typename BeliefStep<Most>::Interval> BeliefStep<Most>::Line::alive()
   return all;
 }
 
-// Where going on and failing meet, between two scores of a line.
+// An interval of scores on a line that holds an edge of failure: the machine goes on at one end and fails at the other.
 template <int Most>
 struct BeliefStep<Most>::Edge {
   std::size_t line;

@@ -1,5 +1,5 @@
 #pragma once
-// Carries what is believed of a machine's state over one step, for many trials at once.
+// Carries the distribution of a machine's state over one step, for many trials at once.
 
 #include <Eigen/Core>
 #include <span>
@@ -12,9 +12,9 @@
 
 namespace metastable::analysis {
 
-/// What is believed after a step, before anything is seen. The vector holds the machine's point (see
-/// MachineStepper::size()), then an error of this row for every sensor that shares errors between rows, then the one of
-/// the row before.
+/// The distribution of the state after a step, before the next row is measured. Its vector holds the machine's point
+/// (see MachineStepper::size()), then an error of this row for every sensor that shares errors between rows, then the
+/// one of the row before.
 template <int Most>
 struct AfterStep {
   BeliefMixture<Most> belief;
@@ -22,7 +22,7 @@ struct AfterStep {
   double failed_wide = 0;  ///< the same of an outlier's scores
 };
 
-/// Steps beliefs. A belief before a step holds the point and the errors of its row.
+/// Steps distributions. The vector before a step holds the point and the errors of its row.
 template <int Most>
 class BeliefStep {
  public:

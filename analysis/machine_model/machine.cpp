@@ -38,7 +38,7 @@ void require_effect(const MachineEffect& effect) {
   }
 }
 
-// What one word names must be one thing.
+// Refuses an empty name, and one that is given twice.
 void require_distinct(const std::string& what, const std::vector<std::string>& names) {
   std::set<std::string> seen;
   for (const std::string& name : names) {

@@ -1,5 +1,6 @@
 #pragma once
-// Where and when a machine's steps were taken: what an effect of any machine may go by.
+// The place, time, phase and order in which each step of a machine was taken: the quantities on which an effect of any
+// machine may depend.
 
 #include <cstddef>
 #include <string>

@@ -62,7 +62,7 @@ std::function<std::vector<NamedValue>(const Values&, const Values&)> changed_in(
   };
 }
 
-// What one parameter of the machine may do by itself.
+// The effects in which one parameter of the machine varies.
 class Varying {
  public:
   Varying(const MachineParameter& parameter, std::size_t value, std::shared_ptr<const MachineDesign> design)

@@ -1,7 +1,6 @@
 #pragma once
 // The effects of a machine as they are fitted: those that its user suspects, and those that any machine may have.
 
-#include <functional>
 #include <memory>
 #include <vector>
 
@@ -15,7 +14,7 @@ namespace metastable::analysis {
 /// An effect as it is fitted, and what it does to what is supposed of the machine.
 struct MachineCandidate {
   Candidate candidate;
-  std::function<void(MachineHypothesis&, const std::vector<double>& variant, const std::vector<double>& values)> apply;
+  MachineChange apply;
 };
 
 /// Lists the suspected effects by their ids; then, for each parameter q that may vary, q_by_phase, q_drift (over the

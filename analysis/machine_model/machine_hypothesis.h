@@ -1,13 +1,14 @@
 #pragma once
-// What is supposed of a machine while its trials are followed: the values of its map, and what varies in them.
+// A hypothesis about a machine, under which its trials are followed: the values of its map, and how they vary.
 
 #include <cstddef>
+#include <functional>
 #include <vector>
 
 namespace metastable::analysis {
 
-/// What is supposed. Where a list goes by transition, these are numbered over all trials: row k to k + 1 of the first
-/// trial, and so on.
+/// The values of the map and their variations. Lists by transition number the transitions over all trials: row k to k +
+/// 1 of the first trial, and so on.
 struct MachineHypothesis {
   /// A value of the map that is more by so much in each transition.
   struct Change {
@@ -43,6 +44,10 @@ struct MachineHypothesis {
   double outliers = 0;                   ///< share of steps whose scores are drawn wide
   double wild = 0;                       ///< share of rows that say nothing of the state
 };
+
+/// Changes a hypothesis as an effect or a variation does, with these values of its variant and its parameters.
+using MachineChange =
+    std::function<void(MachineHypothesis&, const std::vector<double>& variant, const std::vector<double>& values)>;
 
 inline constexpr double outlier_width = 4;  ///< sd of the scores of an outlier
 inline constexpr double wild_width = 10;    ///< sd of a wild row, in sds of what was expected there

@@ -1,5 +1,5 @@
 #pragma once
-// What was measured of a machine: trials, row by row.
+// The measured trials of a machine, row by row.
 
 #include <cstddef>
 #include <limits>
@@ -13,7 +13,7 @@ namespace metastable::analysis {
 
 enum class MachineOutcome { failed, stopped, lost };
 
-/// What is known of a state, between two steps. NaN: not known.
+/// The measured values between two steps. NaN stands for a value that is missing.
 struct MachineRow {
   std::vector<double> seen;                                    ///< [Machine::observe]
   double time = std::numeric_limits<double>::quiet_NaN();      ///< [s] by one clock for all trials
@@ -50,8 +50,8 @@ struct MachineRuns {
   bool placed() const;              ///< every row has its position
 };
 
-/// Says what of the runs does not look like this machine's: columns in other units, a column that is constant, trials
-/// that are there twice; a sentence each.
+/// Lists in sentences the signs that the runs are not this machine's: columns in other units, a column that is
+/// constant, trials that are there twice.
 /// @throws std::invalid_argument where they do not fit the machine: no transition, fewer rows than parameters, rows of
 ///   another shape, a first row that lacks a state without launch
 std::vector<std::string> look_over(const Machine& machine, const MachineRuns& runs);

@@ -29,7 +29,7 @@ class Draws {
   std::size_t trial_;
 };
 
-// What a number is drawn for; scores, sensors and offsets follow one another from these.
+// The purpose of a random number. Scores, sensors and offsets count up from the number of theirs.
 enum Purpose : std::size_t {
   outlier,
   wild,
@@ -115,7 +115,7 @@ Walking Walker::launched(std::size_t trial) const {
   return walking;
 }
 
-// What is seen of a row, with its errors and what is missing.
+// The measured row: the state with its errors, and with the values missing that the design lacks.
 MachineRow Walker::seen(std::size_t trial, std::size_t row, Walking& walking) const {
   const Draws draws(seed_, trial);
   const std::size_t like = design_row(trial, row);

@@ -1,7 +1,6 @@
 #pragma once
-// What may vary in a machine without a name.
+// Variations of a machine that no effect names.
 
-#include <functional>
 #include <memory>
 #include <vector>
 
@@ -15,10 +14,11 @@ namespace metastable::analysis {
 /// Something that varies without a name, and what it does to what is supposed of the machine.
 struct MachineVariation {
   Variation variation;
-  std::function<void(MachineHypothesis&, const std::vector<double>& variant, const std::vector<double>& values)> apply;
+  MachineChange apply;
 };
 
-/// Lists what may vary without a name: each state is pushed, and the scores' spread changes, by what a step may go by.
+/// Lists the variations: a push of each state, and a change of the scores' spread, each as a function of the states,
+/// the phase, the order of trials, the step number, the place, the clock and the labels.
 std::vector<MachineVariation> machine_variations(const Machine& machine, std::shared_ptr<const MachineDesign> design);
 
 }  // namespace metastable::analysis

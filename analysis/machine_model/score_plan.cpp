@@ -19,7 +19,8 @@ constexpr double tried_score = 1.7320508075688772;
 constexpr double far_score = 4.5;  // beyond it no failure is sought
 constexpr std::size_t on_a_lattice = 2;
 
-// What is told of each score: the largest share of its slope by which it bends, and how often it leads to failure.
+// The findings about each score: the largest second difference as a share of the slope, and how often it leads to
+// failure.
 struct Told {
   std::vector<double> bends, fails;
   bool ever = false;  // some point failed

@@ -1,5 +1,5 @@
 #pragma once
-// Which of a step's scores a machine's map bends in, and in which it fails.
+// The scores in which a machine's map is nonlinear, and those by which it fails.
 
 #include <cstddef>
 #include <optional>

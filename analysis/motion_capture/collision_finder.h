@@ -38,8 +38,8 @@ struct FoundCollision {
   /// The fit's residual sd where it is more than the noise of the angle [rad]: the speeds are less exact; 0 elsewhere.
   double rough_rad = 0;
   bool flies = false;  ///< the fit's motion behind the collision is a flight
-  /// How far the fit's omega_minus lay off the speed that the time since the collision before tells [rad/s]; that speed
-  /// stands in its place then, and omega_plus of the fit tells nothing. 0 elsewhere.
+  /// The difference of the fitted omega_minus from the speed that follows from the time since the collision before
+  /// [rad/s], where the fit was replaced by that speed and its omega_plus was dropped; 0 where the fit was kept.
   double mended_rad_s = 0;
 };
 

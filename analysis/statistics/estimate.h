@@ -5,7 +5,7 @@
 
 namespace metastable::analysis {
 
-/// What has no end, and what is not defined or was not asked.
+/// The double infinity, and the NaN that stands for a number that is not defined or was not asked for.
 inline constexpr double infinite = std::numeric_limits<double>::infinity();
 inline constexpr double undefined = std::numeric_limits<double>::quiet_NaN();
 

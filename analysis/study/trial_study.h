@@ -16,10 +16,10 @@ inline constexpr double before_trials = 0.999;
 /// there is one, otherwise the map.
 std::optional<Metastability> trial_study(const Problem& problem, const StudyOptions& options);
 
-/// Where landings read from a table, or what states leave out, may move the expected steps by a tenth and more, an
-/// estimate of first order may miss how much: the events themselves are followed from 4000 launches, no further than
-/// survival is known, if `problem` can. @throws StatesTooCoarse with both numbers if what is followed lies outside the
-/// interval of the study by more than 4 standard errors
+/// Checks a study against events that are followed one by one, if `problem` can follow them: 4000 launches, no further
+/// than survival is known. It does so where the errors of a table of landings, or of what states leave out, may move
+/// the expected steps by a tenth or more, which an estimate of first order may get wrong. @throws StatesTooCoarse with
+/// both numbers if what is followed lies outside the interval of the study by more than 4 standard errors
 void require_followed(const Problem& problem, const Metastability& study, const StudyOptions& options);
 
 /// Holds the chain's answer against drawn trials. Cells and nodes smear noise that is much narrower than they are, and

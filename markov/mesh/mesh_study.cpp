@@ -36,8 +36,8 @@ constexpr double least = 0.25;        // of what the extrapolation's last order 
 constexpr double row_error = 5e-4;    // what reading rows off curves may leave, about so much
 constexpr std::size_t fewest_trials = 100;
 constexpr std::size_t most_trials = 10000000;  // they leave 0.03 % of the steps, and take 80 MB
-// Where fewer trials than this would be simulated, walks that do not end are counted instead, with half of the steps
-// that trials have: an eighth of a quick study's time.
+// A simulation of fewer trials than this is replaced by walks that do not end at a failure, with half of the steps that
+// the trials would have: an eighth of a quick study's time.
 constexpr std::size_t walk_count = 512;
 constexpr double least_counted_share = 0.5;
 // A pilot of one trial in sixteen, of 8 to 128, sees whether trials end within four times the expected steps: of 8, 7

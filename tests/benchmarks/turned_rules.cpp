@@ -130,7 +130,7 @@ std::vector<Turned> turned_rules(const std::vector<std::string>& names) {
   return all;
 }
 
-// What all cases count to under one set of rules.
+// The counts over all cases under one set of rules.
 struct Count {
   int alarms = 0, misnamed = 0, named = 0, verdicts = 0, amounts = 0, said = 0;
 };

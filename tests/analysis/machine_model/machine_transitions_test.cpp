@@ -26,7 +26,7 @@ std::string said(const Diagnosis& d) {
   return all;
 }
 
-// What is done to the runs, and the parameter by which it is found.
+// A change made to the runs, and the size of the parameter that should be found.
 struct Done {
   const char* cause;
   double bend, drift, spread, size;

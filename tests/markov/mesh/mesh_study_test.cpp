@@ -101,7 +101,7 @@ TEST(MeshStudy, SimulationRefutesFailuresThatAreSteppedOver) {
     EXPECT_NE(text.find("no number is given"), std::string::npos) << text;
   }
   EXPECT_NE(narrow.find("failed within 97 steps, where the mesh foretells 0.0"), std::string::npos) << narrow;
-  // What trials find alone is said where enough of them fail: 11.8 and 645 steps.
+  // The sentence gives the mean of the simulated trials where enough of them fail: 11.8 and 645 steps.
   EXPECT_NE(wide.find("simulated trials fail after 11."), std::string::npos) << wide;
   EXPECT_NE(narrow.find("simulated trials fail after "), std::string::npos) << narrow;
   const BatchMap by_state = damped_batch([](double s, double, double) { return s > 1.9 && s < 1.95; });
