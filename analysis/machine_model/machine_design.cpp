@@ -11,23 +11,18 @@ namespace {
 // Fills in means and spreads of the columns.
 void measure_columns(MachineDesign& design, const Machine& machine, const MachineRuns& runs) {
   for (std::size_t j = 0; j < machine.observe.size(); ++j) {
-    double count = 0, sum = 0, squares = 0, pairs = 0, first = 0, second = 0;
+    const ColumnSpread column = column_spread(runs, j);
+    design.mean.push_back(column.mean);
+    design.sd.push_back(column.sd);
+    double pairs = 0, first = 0, second = 0;
     for (const MachineTrial& trial : runs.trials)
-      for (std::size_t k = 0; k < trial.rows.size(); ++k) {
-        const double x = trial.rows[k].seen[j];
-        if (std::isnan(x)) continue;
-        ++count;
-        sum += x;
-        squares += x * x;
-        if (k == 0 || std::isnan(trial.rows[k - 1].seen[j])) continue;
-        const double moved = x - trial.rows[k - 1].seen[j];
+      for (std::size_t k = 1; k < trial.rows.size(); ++k) {
+        const double moved = trial.rows[k].seen[j] - trial.rows[k - 1].seen[j];
+        if (std::isnan(moved)) continue;
         ++pairs;
         first += moved;
         second += moved * moved;
       }
-    const double mean = sum / std::max(1.0, count);
-    design.mean.push_back(mean);
-    design.sd.push_back(std::sqrt(std::max(0.0, squares / std::max(1.0, count) - mean * mean)));
     const double drift = first / std::max(1.0, pairs);
     design.change.push_back(std::sqrt(std::max(0.0, second / std::max(1.0, pairs) - drift * drift)));
   }

@@ -30,7 +30,7 @@ class Follower {
     for (std::size_t j = 0; j < machine.observe.size(); ++j) {
       state_.push_back(static_cast<Eigen::Index>(machine.state_index(machine.observe[j].state)));
       shared_.push_back(machine.observe[j].correlation != 0 ? shared_count_++ : -1);
-      scale_.push_back(spread_of(j));
+      scale_.push_back(column_spread(runs, j).sd);
     }
     std::size_t number = 0;
     for (const MachineTrial& trial : runs.trials) {
@@ -42,7 +42,6 @@ class Follower {
   Evaluation follow(const std::vector<Event>& events, std::vector<double>* chances);
 
  private:
-  double spread_of(std::size_t sensor) const;
   double added_variance(std::size_t sensor) const;
   double failed_in(const AfterStep<Most>& after) const {
     return (1 - supposed_.outliers) * after.failed + supposed_.outliers * after.failed_wide;
@@ -69,20 +68,6 @@ class Follower {
   std::vector<std::size_t> cursor_;  // by trial: its next event
   std::size_t trial_ = 0;
 };
-
-template <int Most>
-double Follower<Most>::spread_of(std::size_t sensor) const {
-  double count = 0, sum = 0, squares = 0;
-  for (const MachineTrial& trial : runs_.trials)
-    for (const MachineRow& row : trial.rows)
-      if (!std::isnan(row.seen[sensor])) {
-        ++count;
-        sum += row.seen[sensor];
-        squares += row.seen[sensor] * row.seen[sensor];
-      }
-  const double mean = count > 0 ? sum / count : 0;
-  return count > 0 ? std::sqrt(std::max(0.0, squares / count - mean * mean)) : 1;
-}
 
 // Returns the variance of the error that no other row shares, with what keeps a density finite.
 template <int Most>

@@ -6,6 +6,7 @@
 #include <cmath>
 #include <map>
 #include <numbers>
+#include <numeric>
 #include <stdexcept>
 
 #include "analysis/statistics/median.h"
@@ -211,6 +212,18 @@ bool MachineRuns::timed() const {
 
 bool MachineRuns::placed() const {
   return every_row(*this, [](const MachineRow& row) { return std::isfinite(row.position); });
+}
+
+// In two passes: a column far from zero keeps its spread.
+ColumnSpread column_spread(const MachineRuns& runs, std::size_t sensor) {
+  const std::vector<double> values = column(runs, sensor);
+  if (values.empty()) return {};
+  const auto count = static_cast<double>(values.size());
+  ColumnSpread spread{std::accumulate(values.begin(), values.end(), 0.0) / count, 0};
+  double squares = 0;
+  for (const double x : values) squares += (x - spread.mean) * (x - spread.mean);
+  spread.sd = std::sqrt(squares / count);
+  return spread;
 }
 
 std::vector<std::string> look_over(const Machine& machine, const MachineRuns& runs) {

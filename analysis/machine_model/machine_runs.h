@@ -50,6 +50,12 @@ struct MachineRuns {
   bool placed() const;              ///< every row has its position
 };
 
+/// The mean and the standard deviation of the values that a sensor has in all rows; mean 0 and sd 1 without a value.
+struct ColumnSpread {
+  double mean = 0, sd = 1;
+};
+ColumnSpread column_spread(const MachineRuns& runs, std::size_t sensor);
+
 /// Lists in sentences the signs that the runs are not this machine's: columns in other units, a column that is
 /// constant, trials that are there twice.
 /// @throws std::invalid_argument where they do not fit the machine: no transition, fewer rows than parameters, rows of

@@ -31,16 +31,8 @@ std::vector<Eigen::VectorXd> measured_states(const Machine& machine, const Machi
                                              std::vector<TransitionPlace>& places) {
   std::vector<Eigen::VectorXd> all;
   Eigen::VectorXd usual = Eigen::VectorXd::Zero(static_cast<Eigen::Index>(machine.states.size()));
-  for (std::size_t j = 0; j < machine.observe.size(); ++j) {
-    double sum = 0, count = 0;
-    for (const MachineTrial& trial : runs.trials)
-      for (const MachineRow& row : trial.rows)
-        if (!std::isnan(row.seen[j])) {
-          sum += row.seen[j];
-          ++count;
-        }
-    usual[static_cast<Eigen::Index>(machine.state_index(machine.observe[j].state))] = count > 0 ? sum / count : 0;
-  }
+  for (std::size_t j = 0; j < machine.observe.size(); ++j)
+    usual[static_cast<Eigen::Index>(machine.state_index(machine.observe[j].state))] = column_spread(runs, j).mean;
   for (const MachineLaunch& launch : machine.launches)
     usual[static_cast<Eigen::Index>(machine.state_index(launch.state))] = launch.mean;
   for (std::size_t t = 0; t < runs.trials.size(); ++t)
