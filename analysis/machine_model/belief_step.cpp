@@ -1,8 +1,10 @@
 #include "analysis/machine_model/belief_step.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <limits>
+#include <numeric>
 #include <utility>
 
 namespace metastable::analysis {
@@ -16,6 +18,9 @@ constexpr int divisions = 8, parts_of_edge = 4;
 constexpr std::size_t about_an_edge =
     3;  // points to either side of an edge from the mean, where other states have theirs
 constexpr double next_to_nothing = 1e-5;  // a chance of failure, or a weight of cells
+constexpr double near_the_middle = 2.1;   // sds of the other score within which lines are sought that tell of the rest
+constexpr std::ptrdiff_t worth_telling = 4;  // such lines, from which on three tell of them all
+constexpr double beside_its_place = 0.1;     // in spacings, by which an edge that others tell may leave its two points
 // A chance of failure at the mean state from which on states about it are asked, too, and one at which these count in
 // full.
 constexpr double worth_states = 1e-4, all_states = 2e-3;
@@ -212,9 +217,16 @@ std::vector<typename BeliefStep<Most>::Interval> BeliefStep<Most>::Line::alive()
 // An interval of scores on a line that holds an edge of failure: the machine goes on at one end and fails at the other.
 template <int Most>
 struct BeliefStep<Most>::Edge {
-  std::size_t line;
+  Line* line;
   double low, high;
   bool low_alive, counts;
+};
+
+// Neighbouring lines on which failing looks alike: the edges of three of them tell those of all.
+template <int Most>
+struct BeliefStep<Most>::Alike {
+  std::size_t first, last;
+  std::array<std::size_t, 3> nodes;
 };
 
 // Lines from the mean of one trial's belief, as the lattice has them: edges are in the middle between two points.
@@ -243,6 +255,7 @@ std::vector<typename BeliefStep<Most>::Line> BeliefStep<Most>::lines(std::span<c
   const auto columns = static_cast<double>(used_.size());
   const double spread = std::max(3.0, columns);  // points at the root of it have the normal's second moment
   std::vector<Line> all, fine;
+  std::vector<std::vector<Line>> roughly;  // of the trials of the fine lines
   for (std::size_t t = 0; t < places.size(); ++t) {
     const Vector mean = beliefs[t].mean.head(size());
     std::vector<Line> rough = rough_lines(t, mean);
@@ -257,27 +270,134 @@ std::vector<typename BeliefStep<Most>::Line> BeliefStep<Most>::lines(std::span<c
       for (const Eigen::Index i : used_)
         for (const double sign : {1.0, -1.0})
           if (about) add(0.5 / spread, true, mean + sign * std::sqrt(spread) * roots[t].col(i).head(size()));
+      roughly.push_back(std::move(rough));
     } else {
       std::ranges::move(rough, std::back_inserter(all));
     }
   }
-  if (!fine.empty()) find_edges(fine, places);
+  find_few(fine, roughly, places);
   std::ranges::move(fine, std::back_inserter(all));
   std::ranges::stable_sort(all, {}, &Line::trial);
   return all;
 }
 
+template <int Most>
+std::vector<typename BeliefStep<Most>::Alike> BeliefStep<Most>::alike(std::span<const Line> rough) const {
+  std::vector<Alike> all;
+  for (std::size_t first = 0, last = 0; first < rough.size(); first = last + 1) {
+    last = first;
+    while (last + 1 < rough.size() && rough[last + 1].like(rough[first])) ++last;
+    const auto near = [&](std::size_t l) { return std::abs(axis_.points[l]) <= near_the_middle; };
+    std::size_t from = first, to = last;
+    while (from < last && !near(from)) ++from;
+    while (to > from && !near(to)) --to;
+    if (rough[first].edges.empty() || std::ssize(rough.subspan(from, to + 1 - from)) < worth_telling) continue;
+    all.push_back({first, last, {from, std::midpoint(from, to), to}});
+  }
+  return all;
+}
+
+// Interpolates the edges of a line between those of the nodes. Returns whether they lie where the lattice has them.
+template <int Most>
+bool BeliefStep<Most>::foretell(Line& line, const Alike& group, std::span<const Line> from_mean) const {
+  const double x = axis_.points[line.first / axis_.points.size()];
+  std::array<double, 3> at, share = {1, 1, 1};
+  for (std::size_t i = 0; i < 3; ++i) at[i] = axis_.points[group.nodes[i]];
+  for (std::size_t i = 0; i < 3; ++i)
+    for (std::size_t j = 0; j < 3; ++j)
+      if (j != i) share[i] *= (x - at[j]) / (at[i] - at[j]);
+  for (std::size_t e = 0; e < line.edges.size(); ++e) {
+    double told = 0;
+    for (std::size_t i = 0; i < 3; ++i) told += share[i] * from_mean[group.nodes[i]].edges[e];
+    const double off = told - line.edges[e], half = 0.5 * axis_.spacing;
+    if (std::abs(off) > half + beside_its_place * axis_.spacing) return false;
+    line.edges[e] += std::clamp(off, -half, half);
+  }
+  return true;
+}
+
+// The lines from a state about the mean have the mean's edges, moved as that of its one known line.
+template <int Most>
+void BeliefStep<Most>::move_edges(std::span<Line> about, std::span<const Line> from_mean, std::size_t telling) const {
+  for (std::size_t l = 0; l < about.size(); ++l) {
+    if (about[l].known) continue;
+    about[l].begins_alive = from_mean[l].begins_alive;
+    about[l].edges = from_mean[l].edges;
+    for (std::size_t e = 0; e < about[l].edges.size() && from_mean[l].like(from_mean[telling]); ++e)
+      about[l].edges[e] += about[telling].edges[e] - from_mean[telling].edges[e];
+  }
+}
+
+// Edges vary smoothly with the other score and with the state. They are sought on three lines from the mean and on one
+// from each state about it, and on all others only where these do not tell them.
+// @param lines  trial by trial: those from the mean, then those from each state about it
+// @param rough  of the same trials, from the mean
+template <int Most>
+void BeliefStep<Most>::find_few(std::vector<Line>& lines, const std::vector<std::vector<Line>>& rough,
+                                std::span<const TransitionPlace> places) const {
+  const std::size_t each = lattice_points() / axis_.points.size();
+  std::vector<std::vector<Alike>> groups;
+  std::vector<std::size_t> telling, starts;
+  std::vector<Line*> sought;
+  const auto seek = [&](Line& line) {
+    if (!std::exchange(line.known, true)) sought.push_back(&line);
+  };
+  const auto from = [&](std::size_t line) { return std::span(lines).subspan(line, each); };
+  std::size_t end = 0;
+  for (const std::vector<Line>& lattice : rough) {
+    starts.push_back(end);
+    groups.push_back(alike(lattice));
+    const auto chance = [&](const Line& line) { return chance_on(line); };
+    telling.push_back(static_cast<std::size_t>(std::ranges::max_element(lattice, {}, chance) - lattice.begin()));
+    const std::span<Line> mean = from(end);
+    std::vector<char> told(each);
+    for (const Alike& group : groups.back()) {
+      std::fill(told.begin() + static_cast<std::ptrdiff_t>(group.first),
+                told.begin() + static_cast<std::ptrdiff_t>(group.last) + 1, char{1});
+      for (const std::size_t node : group.nodes) seek(mean[node]);
+    }
+    for (std::size_t l = 0; l < each; ++l)
+      if (!told[l]) seek(mean[l]);
+    for (end += each; end < lines.size() && lines[end].about; end += each) seek(lines[end + telling.back()]);
+  }
+  starts.push_back(end);
+  find_edges(sought, places);
+  sought.clear();
+  for (std::size_t t = 0; t < rough.size(); ++t) {
+    const std::span<Line> mean = from(starts[t]);
+    for (const Alike& group : groups[t])
+      for (std::size_t l = group.first; l <= group.last; ++l) {
+        if (mean[l].known) continue;
+        Line told = rough[t][l];
+        if (foretell(told, group, mean)) {
+          mean[l].begins_alive = told.begins_alive;
+          mean[l].edges = told.edges;
+          mean[l].known = true;
+        } else {
+          seek(mean[l]);
+        }
+      }
+    for (std::size_t about = starts[t] + each; about < starts[t + 1]; about += each)
+      if (!lines[about + telling[t]].like(rough[t][telling[t]]))
+        for (Line& line : from(about)) seek(line);
+  }
+  find_edges(sought, places);
+  for (std::size_t t = 0; t < rough.size(); ++t)
+    for (std::size_t about = starts[t] + each; about < starts[t + 1]; about += each)
+      move_edges(from(about), from(starts[t]), telling[t]);
+}
+
 // Says of every point of the lines whether the machine goes on: of those from the mean as the lattice has it; of others
 // the points about the mean's edges are stepped.
 template <int Most>
-std::vector<char> BeliefStep<Most>::goes_on(const std::vector<Line>& lines, std::span<const TransitionPlace> places,
+std::vector<char> BeliefStep<Most>::goes_on(std::span<Line* const> lines, std::span<const TransitionPlace> places,
                                             MachineStepper& stepper) const {
   const std::size_t n = axis_.points.size();
   std::vector<char> alive(lines.size() * n);
   std::vector<std::size_t> asked;
   stepper.clear();
   for (std::size_t l = 0; l < lines.size(); ++l) {
-    const Line& line = lines[l];
+    const Line& line = *lines[l];
     char* here = alive.data() + l * n;
     for (std::size_t i = 0; i < n; ++i) here[i] = !stepper_.failed(lattice_start(line.trial) + line.first + i);
     std::vector<char> near(n);
@@ -290,46 +410,47 @@ std::vector<char> BeliefStep<Most>::goes_on(const std::vector<Line>& lines, std:
         asked.push_back(l * n + i);
       }
   }
-  stepper.run();
+  if (!asked.empty()) stepper.run();
   for (std::size_t i = 0; i < asked.size(); ++i) alive[asked[i]] = !stepper.failed(i);
   return alive;
 }
 
 // Seeks the edges of failure on all lines together; those that hardly weigh are left between two points.
 template <int Most>
-void BeliefStep<Most>::find_edges(std::vector<Line>& lines, std::span<const TransitionPlace> places) const {
+void BeliefStep<Most>::find_edges(std::span<Line* const> lines, std::span<const TransitionPlace> places) const {
+  if (lines.empty()) return;
   const std::size_t n = axis_.points.size();
   MachineStepper stepper = stepper_.another();
   const std::vector<char> alive = goes_on(lines, places, stepper);
   std::vector<Edge> edges;
   for (std::size_t l = 0; l < lines.size(); ++l) {
     const char* here = alive.data() + l * n;
-    lines[l].begins_alive = here[0] != 0;
-    const double share = plan_.lattice.size() > 1 ? axis_.shares[lines[l].first / n] : 1;
+    lines[l]->begins_alive = here[0] != 0;
+    const double share = plan_.lattice.size() > 1 ? axis_.shares[lines[l]->first / n] : 1;
     for (std::size_t i = 0; i + 1 < n; ++i)
       if (here[i] != here[i + 1]) {
         const bool counts = share * std::max(axis_.shares[i], axis_.shares[i + 1]) > next_to_nothing;
-        edges.push_back({l, axis_.points[i], axis_.points[i + 1], here[i] != 0, counts});
+        edges.push_back({lines[l], axis_.points[i], axis_.points[i + 1], here[i] != 0, counts});
       }
   }
-  for (int round = 0; round < divisions; ++round) divide(edges, lines, places, stepper);
-  for (const Edge& edge : edges) lines[edge.line].edges.push_back(0.5 * (edge.low + edge.high));
+  for (int round = 0; round < divisions; ++round) divide(edges, places, stepper);
+  for (const Edge& edge : edges) edge.line->edges.push_back(0.5 * (edge.low + edge.high));
 }
 
 // Divides what each edge lies in, and keeps the part that holds it.
 template <int Most>
-void BeliefStep<Most>::divide(std::vector<Edge>& edges, const std::vector<Line>& lines,
-                              std::span<const TransitionPlace> places, MachineStepper& stepper) const {
+void BeliefStep<Most>::divide(std::vector<Edge>& edges, std::span<const TransitionPlace> places,
+                              MachineStepper& stepper) const {
   stepper.clear();
   for (const Edge& edge : edges) {
-    const Line& line = lines[edge.line];
+    const Line& line = *edge.line;
     Vector fresh = lattice_scores(line.first);
     for (int i = 1; i < parts_of_edge && edge.counts; ++i) {
       fresh[static_cast<Eigen::Index>(*plan_.failing)] = edge.low + i * (edge.high - edge.low) / parts_of_edge;
       stepper.add(places[line.trial], line.from, fresh);
     }
   }
-  stepper.run();
+  if (std::ranges::any_of(edges, &Edge::counts)) stepper.run();
   std::size_t first = 0;
   for (Edge& edge : edges) {
     if (!edge.counts) continue;
@@ -420,13 +541,12 @@ void BeliefStep<Most>::take_cell(Part& part, std::size_t trial, const Cell& cell
 }
 
 template <int Most>
-AfterStep<Most> BeliefStep<Most>::on_lattice(std::size_t trial, const Part& belief, const Matrix& root,
-                                             std::span<const Line> lines) const {
+void BeliefStep<Most>::on_lattice(AfterStep<Most>& after, std::size_t trial, const Part& belief, const Matrix& root,
+                                  std::span<const Line> lines) const {
   const Slopes slope = slopes(trial);
   const Part common = part(slope, belief, root);
   const Vector bent = common.mean.head(states()) - slope.centre;
   const Matrix straight = columns(slope.first, root);
-  AfterStep<Most> after;
   for (std::size_t p = 0; p < lattice_points(); ++p) {
     const Cell here = cell(trial, p, lines);
     after.failed += here.dead;
@@ -448,7 +568,7 @@ AfterStep<Most> BeliefStep<Most>::on_lattice(std::size_t trial, const Part& beli
     take_cell(one, trial, here);
     after.belief.parts().push_back(std::move(one));
   }
-  if (lines.empty()) return after;
+  if (lines.empty()) return;
   // The cells are those from the mean state; what they leave to failure is that from all states.
   const double failed = chance_of_failure(lines), goes_on = std::log1p(-std::min(failed, almost_sure));
   const double ratio = goes_on - std::log1p(-std::min(after.failed, almost_sure));
@@ -456,12 +576,11 @@ AfterStep<Most> BeliefStep<Most>::on_lattice(std::size_t trial, const Part& beli
   after.failed = failed;
   const Line& middle = lines[plan_.lattice.size() > 1 ? axis_.points.size() / 2 : 0];  // the other score at zero
   after.failed_wide = 1 - cell_part(0, outlier_width, middle.alive()).mass;
-  return after;
 }
 
 template <int Most>
-std::vector<AfterStep<Most>> BeliefStep<Most>::step(std::span<const TransitionPlace> places,
-                                                    std::span<const Part> beliefs) {
+void BeliefStep<Most>::step(std::span<const TransitionPlace> places, std::span<const Part> beliefs,
+                            const std::function<void(std::size_t, AfterStep<Most>&)>& take) {
   std::vector<Matrix> roots;
   for (const Part& belief : beliefs) roots.push_back(root_of(belief.covariance));
   used_.clear();
@@ -474,19 +593,20 @@ std::vector<AfterStep<Most>> BeliefStep<Most>::step(std::span<const TransitionPl
   stepper_.run();
   std::vector<Line> edges;
   if (plan_.failing) edges = lines(places, beliefs, roots);
-  std::vector<AfterStep<Most>> all;
+  AfterStep<Most> after;
   std::size_t line = 0;
   for (std::size_t t = 0; t < places.size(); ++t) {
+    after.belief.parts().clear();
+    after.failed = after.failed_wide = 0;
     if (!plan_.lattice.empty()) {
       const std::size_t first = line;
       while (line < edges.size() && edges[line].trial == t) ++line;
-      all.push_back(on_lattice(t, beliefs[t], roots[t], std::span(edges).subspan(first, line - first)));
-      continue;
+      on_lattice(after, t, beliefs[t], roots[t], std::span(edges).subspan(first, line - first));
+    } else {
+      after.belief.parts().push_back(part(slopes(t), beliefs[t], roots[t]));
     }
-    all.emplace_back();
-    all.back().belief.parts().push_back(part(slopes(t), beliefs[t], roots[t]));
+    take(t, after);
   }
-  return all;
 }
 
 template class BeliefStep<small_belief>;

@@ -2,6 +2,7 @@
 // Carries the distribution of a machine's state over one step, for many trials at once.
 
 #include <Eigen/Core>
+#include <functional>
 #include <span>
 #include <vector>
 
@@ -32,7 +33,10 @@ class BeliefStep {
 
   /// @param shared  sensors that share errors between rows
   BeliefStep(MachineStepper& stepper, const ScorePlan& plan, std::size_t shared);
-  std::vector<AfterStep<Most>> step(std::span<const TransitionPlace> places, std::span<const Part> beliefs);
+  /// Steps beliefs, all in one call of the machine's map, and hands on what comes of each, in their order.
+  /// @param take  is given the number of the belief and its distribution after the step, which it may change
+  void step(std::span<const TransitionPlace> places, std::span<const Part> beliefs,
+            const std::function<void(std::size_t, AfterStep<Most>&)>& take);
 
  private:
   struct Slopes;
@@ -46,9 +50,14 @@ class BeliefStep {
     Vector from = {};                  // its state, as MachineStepper's point
     bool begins_alive = true;
     std::vector<double> edges = {};  // where going on and failing meet, ascending
+    bool known = false;              // the edges
     std::vector<Interval> alive() const;
+    bool like(const Line& other) const {
+      return begins_alive == other.begins_alive && edges.size() == other.edges.size();
+    }
   };
   struct Edge;
+  struct Alike;
 
   Eigen::Index states() const { return static_cast<Eigen::Index>(stepper_.states()); }
   Eigen::Index size() const { return static_cast<Eigen::Index>(stepper_.size()); }
@@ -60,11 +69,15 @@ class BeliefStep {
   std::vector<Line> lines(std::span<const TransitionPlace> places, std::span<const Part> beliefs,
                           std::span<const Matrix> roots) const;
   std::vector<Line> rough_lines(std::size_t trial, const Vector& mean) const;
-  std::vector<char> goes_on(const std::vector<Line>& lines, std::span<const TransitionPlace> places,
+  std::vector<Alike> alike(std::span<const Line> rough) const;
+  bool foretell(Line& line, const Alike& group, std::span<const Line> from_mean) const;
+  void move_edges(std::span<Line> about, std::span<const Line> from_mean, std::size_t telling) const;
+  void find_few(std::vector<Line>& lines, const std::vector<std::vector<Line>>& rough,
+                std::span<const TransitionPlace> places) const;
+  std::vector<char> goes_on(std::span<Line* const> lines, std::span<const TransitionPlace> places,
                             MachineStepper& stepper) const;
-  void find_edges(std::vector<Line>& lines, std::span<const TransitionPlace> places) const;
-  void divide(std::vector<Edge>& edges, const std::vector<Line>& lines, std::span<const TransitionPlace> places,
-              MachineStepper& stepper) const;
+  void find_edges(std::span<Line* const> lines, std::span<const TransitionPlace> places) const;
+  void divide(std::vector<Edge>& edges, std::span<const TransitionPlace> places, MachineStepper& stepper) const;
   double chance_on(const Line& line) const;
   double chance_of_failure(std::span<const Line> lines) const;
   Matrix first_differences(std::size_t at, const Vector* centre, Matrix* bend, std::vector<char>* known) const;
@@ -73,8 +86,8 @@ class BeliefStep {
   Part part(const Slopes& slopes, const Part& belief, const Matrix& root) const;
   Cell cell(std::size_t trial, std::size_t point, std::span<const Line> lines) const;
   void take_cell(Part& part, std::size_t trial, const Cell& cell) const;
-  AfterStep<Most> on_lattice(std::size_t trial, const Part& belief, const Matrix& root,
-                             std::span<const Line> lines) const;
+  void on_lattice(AfterStep<Most>& after, std::size_t trial, const Part& belief, const Matrix& root,
+                  std::span<const Line> lines) const;
 
   MachineStepper& stepper_;
   ScorePlan plan_;

@@ -184,18 +184,17 @@ Evaluation Follower<Most>::follow(const std::vector<Event>& events, std::vector<
         before.push_back(beliefs[t]);
       }
     if (places.empty()) break;
-    std::vector<AfterStep<Most>> after = stepping.step(places, before);
-    for (std::size_t i = 0; i < places.size(); ++i) {
+    stepping.step(places, before, [&](std::size_t i, AfterStep<Most>& after) {
       trial_ = places[i].trial;
       const MachineTrial& trial = runs_.trials[trial_];
       if (k + 1 < trial.rows.size()) {
-        beliefs[trial_] = see(after[i], trial.rows[k + 1]);
+        beliefs[trial_] = see(after, trial.rows[k + 1]);
       } else {
-        const double chance = std::clamp(tolerated(failed_in(after[i])), least_chance, 1.0);
+        const double chance = std::clamp(tolerated(failed_in(after)), least_chance, 1.0);
         const double score = dynamics::normal_quantile(std::clamp(0.5 * chance, least_chance, 0.5));
-        put(cursor_[trial_]++, {std::log(chance), score, 1}, failed_in(after[i]));
+        put(cursor_[trial_]++, {std::log(chance), score, 1}, failed_in(after));
       }
-    }
+    });
   }
   return std::move(out_);
 }
