@@ -1,10 +1,11 @@
 #pragma once
 // Steps passive walkers of two stiff legs joined at a hip, on a plane, from just after a strike to just after the next.
 
-#include <array>
 #include <cstdint>
 #include <optional>
 #include <span>
+
+#include "dynamics/walkers/leg_motion.h"
 
 namespace metastable::dynamics {
 
@@ -25,14 +26,6 @@ struct Stride {
   double swing_rate = 0;      ///< [rad/s]
 };
 
-/// Holds both legs during a step, by their angles to the slope's normal [rad], rates [rad/s]. The hip is over the
-/// stance foot at angle 0, uphill of it at positive angles.
-struct LegMotion {
-  double time = 0;  ///< since the last strike [s]
-  double stance_angle = 0, swing_angle = 0;
-  double stance_rate = 0, swing_rate = 0;
-};
-
 /// Holds the slope [rad] of the ground that the next strike is on, and of the ground on which both feet stand: both
 /// angles turn by the difference. Equal, if the ground is one plane that only tilts.
 struct Ground {
@@ -43,11 +36,8 @@ struct Ground {
 /// Walks on two equal legs with point masses, feet that neither slip nor bounce. The swing foot may pass through the
 /// ground beside the stance foot (knees would prevent that); it strikes when it comes down before the stance foot.
 ///
-/// A slope turns gravity: the state stays in the slope's frame (of the ground ahead). With theta and psi the angles of
-/// stance and swing leg,
-///   theta'' - p cos(theta - psi) psi'' - p sin(theta - psi) psi'^2   =  q sin(theta - gamma)
-///   psi''   - r cos(theta - psi) theta'' + r sin(theta - psi) theta'^2 = -w sin(psi - gamma).
-/// Integrated by Taylor series, four walkers at once; energy is kept to 1e-12 between strikes.
+/// A slope turns gravity: the state stays in the slope's frame (of the ground ahead). The motion is that of
+/// LegEquations with a hip that turns freely; energy is kept to 1e-12 between strikes.
 class TwoLinkWalker {
  public:
   /// Returns the simplest walker (Garcia, Chatterjee, Ruina, Coleman 1998): all mass at the hip, feet of vanishing
@@ -82,13 +72,12 @@ class TwoLinkWalker {
   double energy(const LegMotion& motion, double slope) const;
 
  private:
-  TwoLinkWalker(const CompassOptions& masses, const std::array<double, 4>& equations, int dimension);
-  double longest_step() const;
+  TwoLinkWalker(const CompassOptions& masses, const LegEquations& equations, int dimension);
 
   CompassOptions masses_;
-  std::array<double, 4> equations_;  ///< p, q, r, w of the equations of motion
+  LegEquations equations_;
   int dimension_;
-  double taylor_step_;  ///< [s]
+  LegCourse course_;
 };
 
 }  // namespace metastable::dynamics
