@@ -11,6 +11,8 @@ namespace metastable::analysis {
 namespace {
 
 constexpr double half_log_two_pi = 0.91893853320467274178;
+constexpr int rounds_of_bending = 3;
+constexpr double unlikely = 25;  // nats by which a part lies below the likeliest
 constexpr double nothing = -std::numeric_limits<double>::infinity();
 
 double log_sum(const std::vector<double>& logs) {
@@ -28,6 +30,89 @@ double score_of(double below, double above) {
 }
 
 }  // namespace
+
+// The state is bent by 1/2 b0 u^2 + 1/2 b1 v^2 + b2 u v; by one number, v and its bends are zero.
+template <int Most>
+typename BeliefMixture<Most>::Part BeliefMixture<Most>::Part::straightened(const Place& place) const {
+  Part out{log_weight, mean, covariance, width};
+  if (bent == 0) return out;
+  const Eigen::Index states = bends[0].size(), at = mean.size() - bent, size = mean.size();
+  const auto& [around, left] = place;
+  const double u = around[0], v = around[1], uu = left(0, 0), vv = left(1, 1), uv = left(0, 1);
+  BeliefMatrix<Most> turn = BeliefMatrix<Most>::Identity(size, size);
+  turn.col(at).head(states) = u * bends[0] + v * bends[2];
+  out.mean.head(states) += mean[at] * turn.col(at).head(states);
+  if (bent == 2) {
+    turn.col(at + 1).head(states) = v * bends[1] + u * bends[2];
+    out.mean.head(states) += mean[at + 1] * turn.col(at + 1).head(states);
+  }
+  out.mean.head(states) += 0.5 * (uu - u * u) * bends[0] + 0.5 * (vv - v * v) * bends[1] + (uv - u * v) * bends[2];
+  out.covariance = turn * covariance * turn.transpose();
+  // Half the trace of (bend i, covariance, bend j, covariance), for each two states.
+  const std::array<BeliefVector<Most>, 4> ways = {uu * bends[0] + uv * bends[2], uv * bends[0] + vv * bends[2],
+                                                  uu * bends[2] + uv * bends[1], uv * bends[2] + vv * bends[1]};
+  out.covariance.topLeftCorner(states, states) += 0.5 * (ways[0] * ways[0].transpose() + ways[1] * ways[2].transpose() +
+                                                         ways[2] * ways[1].transpose() + ways[3] * ways[3].transpose());
+  return out;
+}
+
+template <int Most>
+typename BeliefMixture<Most>::Part::Place BeliefMixture<Most>::Part::place() const {
+  Place place{Eigen::Vector2d::Zero(), Eigen::Matrix2d::Zero()};
+  const Eigen::Index at = mean.size() - bent;
+  for (Eigen::Index i = 0; i < bent; ++i) {
+    place.around[i] = mean[at + i];
+    for (Eigen::Index j = 0; j < bent; ++j) place.left(i, j) = covariance(at + i, at + j);
+  }
+  return place;
+}
+
+// Returns the log density of a row in a straight part, and updates the part.
+template <int Most>
+double BeliefMixture<Most>::updated(Part& part, std::span<const Look<Most>> looks, std::span<const double> values) {
+  double log_density = part.log_weight;
+  for (std::size_t i = 0; i < looks.size(); ++i) {
+    const BeliefVector<Most> gain = part.covariance * looks[i].weights;
+    const double variance = looks[i].weights.dot(gain) + looks[i].variance;
+    const double off = values[i] - looks[i].offset - looks[i].weights.dot(part.mean);
+    log_density -= 0.5 * (off * off / variance + std::log(variance));
+    part.mean += gain * (off / variance);
+    part.covariance -= gain * (gain.transpose() / variance);
+  }
+  return log_density;
+}
+
+// A row that hardly errs tells where on its bend a part is: each part that the row leaves likely is made straight
+// there.
+template <int Most>
+void BeliefMixture<Most>::straighten(std::span<const Look<Most>> looks, std::span<const double> values) {
+  struct Told {
+    typename Part::Place place;
+    double log_density;
+  };
+  std::vector<Told> told;
+  double most = nothing;
+  const auto tell = [&](const Part& part, const typename Part::Place& from) {
+    Part seen = part.straightened(from);
+    const double log_density = updated(seen, looks, values);
+    seen.bent = part.bent;
+    return Told{seen.place(), log_density};
+  };
+  for (const Part& part : parts_) {
+    told.push_back(part.bent > 0 ? tell(part, part.place()) : Told{{}, nothing});
+    most = std::max(most, told.back().log_density);
+  }
+  for (std::size_t i = 0; i < parts_.size(); ++i) {
+    Part& part = parts_[i];
+    if (part.bent == 0) continue;
+    if (told[i].log_density < most - unlikely) {
+      part = part.straightened(part.place());
+      continue;
+    }
+    for (int round = 1; round < rounds_of_bending; ++round) told[i] = tell(part, told[i].place);
+    part = part.straightened(told[i].place);
+  }
+}
 
 template <int Most>
 double BeliefMixture<Most>::log_mass() const {
@@ -101,10 +186,15 @@ SeenValue BeliefMixture<Most>::see(const Look<Most>& look, double value, double 
 template <int Most>
 typename BeliefMixture<Most>::Part BeliefMixture<Most>::collapsed() const {
   const double mass = log_mass();
-  Part one{0, BeliefVector<Most>::Zero(parts_.front().mean.size()), {}, 1};
-  for (const Part& part : parts_) one.mean += std::exp(part.log_weight - mass) * part.mean;
+  const bool straight = std::ranges::all_of(parts_, [](const Part& part) { return part.bent == 0; });
+  std::vector<Part> bent;
+  for (const Part& part : parts_)
+    if (!straight) bent.push_back(part.straightened(part.place()));
+  const std::vector<Part>& parts = straight ? parts_ : bent;
+  Part one{0, BeliefVector<Most>::Zero(parts.front().mean.size()), {}, 1};
+  for (const Part& part : parts) one.mean += std::exp(part.log_weight - mass) * part.mean;
   one.covariance = BeliefMatrix<Most>::Zero(one.mean.size(), one.mean.size());
-  for (const Part& part : parts_) {
+  for (const Part& part : parts) {
     const BeliefVector<Most> off = part.mean - one.mean;
     one.covariance += std::exp(part.log_weight - mass) * (part.covariance + off * off.transpose());
   }

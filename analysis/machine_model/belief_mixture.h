@@ -3,6 +3,8 @@
 // value updates.
 
 #include <Eigen/Core>
+#include <array>
+#include <span>
 #include <vector>
 
 namespace metastable::analysis {
@@ -43,6 +45,19 @@ class BeliefMixture {
     BeliefVector<Most> mean;
     BeliefMatrix<Most> covariance;
     double width = 1;  ///< above 1: values scatter this many times as far, and do not update this part
+    /// The state is a linear part, whose mean and covariance stand above, plus 1/2 b0 u^2 + 1/2 b1 v^2 + b2 u v, with u
+    /// and v the last `bent` numbers of the vector. Columns of one row that the same noise moves are then consistent.
+    int bent = 0;  ///< 0, 1 or 2
+    std::array<BeliefVector<Most>, 3> bends = {};
+
+    /// Where on the bend the part is: u and v, and their covariance.
+    struct Place {
+      Eigen::Vector2d around;
+      Eigen::Matrix2d left;
+    };
+    Place place() const;
+    /// Returns a normal that is not bent: linear about a place, with the variance that the bend has there.
+    Part straightened(const Place& place) const;
   };
 
   std::vector<Part>& parts() { return parts_; }
@@ -51,6 +66,8 @@ class BeliefMixture {
   /// Adds a part of this share with the mixture's own mean and covariance, around which values scatter `width` times as
   /// far and which they do not update. The weights of the other parts are scaled down by the share.
   void add_wild(double share, double width);
+  /// Makes bent parts straight about where a row's values leave them. Call it before they are seen.
+  void straighten(std::span<const Look<Most>> looks, std::span<const double> values);
   /// Updates the mixture by a measured value (Bayes's rule); the weights then add up to 1.
   /// @param failed  probability that the machine failed instead: it counts as a value below all
   SeenValue see(const Look<Most>& look, double value, double failed);
@@ -58,6 +75,7 @@ class BeliefMixture {
   Part collapsed() const;
 
  private:
+  static double updated(Part& part, std::span<const Look<Most>> looks, std::span<const double> values);
   double log_mass() const;
   Part& give_way(double share);
 

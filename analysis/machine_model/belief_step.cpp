@@ -62,8 +62,8 @@ struct BeliefStep<Most>::Cell {
 };
 
 template <int Most>
-BeliefStep<Most>::BeliefStep(MachineStepper& stepper, const ScorePlan& plan, std::size_t shared)
-    : stepper_(stepper), plan_(plan), shared_(shared) {
+BeliefStep<Most>::BeliefStep(MachineStepper& stepper, const ScorePlan& plan, std::size_t shared, bool bent)
+    : stepper_(stepper), plan_(plan), shared_(shared), bent_(bent) {
   if (!plan_.lattice.empty()) axis_ = lattice_axis(static_cast<int>(plan_.lattice.size()));
   if (plan_.failing && plan_.lattice.front() != *plan_.failing) std::swap(plan_.lattice.front(), plan_.lattice.back());
   for (std::size_t m = 0; m < stepper_.scores(); ++m)
@@ -165,7 +165,7 @@ BeliefMatrix<Most> BeliefStep<Most>::columns(const Matrix& slope, const Matrix& 
   const auto shared = static_cast<Eigen::Index>(shared_), offsets = static_cast<Eigen::Index>(stepper_.offsets());
   const Eigen::Index before = states() + offsets, old = root.cols(),
                      scores = static_cast<Eigen::Index>(straight_.size());
-  Matrix all = Matrix::Zero(size() + 2 * shared, old + scores + shared);
+  Matrix all = Matrix::Zero(size() + 2 * shared + bent(), old + scores + shared);
   for (std::size_t i = 0; i < used_.size(); ++i)
     all.col(used_[i]).head(states()) = slope.col(static_cast<Eigen::Index>(i));
   all.block(states(), 0, offsets, old) = root.block(states(), 0, offsets, old);
@@ -194,7 +194,7 @@ typename BeliefStep<Most>::Part BeliefStep<Most>::part(const Slopes& slopes, con
   out.mean.segment(states(), offsets) = belief.mean.segment(states(), offsets);
   for (Eigen::Index m = states() + offsets; m < size(); ++m)
     out.mean[m] = stepper_.memory(static_cast<std::size_t>(m - states() - offsets)) * belief.mean[m];
-  out.mean.tail(shared) = belief.mean.tail(shared);
+  out.mean.segment(size() + shared, shared) = belief.mean.tail(shared);
   out.covariance = all * all.transpose();
   out.covariance.topLeftCorner(states(), states()) += bend_share * slopes.bend * slopes.bend.transpose();
   return out;
@@ -510,34 +510,75 @@ typename BeliefStep<Most>::Cell BeliefStep<Most>::cell(std::size_t trial, std::s
   return cell;
 }
 
-// Moves a part from scores of zero to a cell, by first and second differences over the lattice.
+// First and second differences over the lattice, by its scores, about a cell's anchor.
 template <int Most>
-void BeliefStep<Most>::take_cell(Part& part, std::size_t trial, const Cell& cell) const {
+struct BeliefStep<Most>::Bend {
+  std::array<Vector, 2> first;
+  std::array<Vector, 3> second;  // along the first score, along the second, and along both
+};
+
+template <int Most>
+typename BeliefStep<Most>::Bend BeliefStep<Most>::bend_at(std::size_t trial, const Cell& cell) const {
   const std::size_t n = axis_.points.size(), here = lattice_start(trial) + cell.anchor;
-  const Eigen::Index before = states() + static_cast<Eigen::Index>(stepper_.offsets());
-  const Vector centre = stepper_.next(here);
+  const Vector centre = stepper_.next(here), none = Vector::Zero(states());
+  Bend bend{{none, none}, {none, none, none}};
+  std::array<bool, 2> inside{};
   std::size_t stride = 1, rest = cell.anchor;
   for (std::size_t b = 0; b < plan_.lattice.size(); ++b, stride *= n, rest /= n) {
     const std::size_t at = rest % n;
+    inside[b] = at > 0 && at + 1 < n;
     const bool up = at + 1 < n && !stepper_.failed(here + stride), down = at > 0 && !stepper_.failed(here - stride);
     const Vector above = up ? Vector(stepper_.next(here + stride)) : centre;
     const Vector below = down ? Vector(stepper_.next(here - stride)) : centre;
-    Vector first = Vector::Zero(states()), second = first;
-    if (up || down) first = (above - below) / ((up ? axis_.spacing : 0) + (down ? axis_.spacing : 0));
-    if (up && down) second = (above + below - 2 * centre) / (axis_.spacing * axis_.spacing);
-    const auto& [mass, mean, variance] = cell.by_score[b];
-    const double off = mean - axis_.points[at], sd = std::sqrt(variance);
-    part.mean.head(states()) += first * off + 0.5 * second * (off * off + variance);
+    if (up || down) bend.first[b] = (above - below) / ((up ? axis_.spacing : 0) + (down ? axis_.spacing : 0));
+    if (up && down) bend.second[b] = (above + below - 2 * centre) / (axis_.spacing * axis_.spacing);
+  }
+  if (!(inside[0] && inside[1])) return bend;
+  const std::array<std::size_t, 4> corners{here + 1 + n, here + 1 - n, here - 1 + n, here - 1 - n};
+  if (std::ranges::any_of(corners, [&](std::size_t corner) { return stepper_.failed(corner); })) return bend;
+  bend.second[2] = (Vector(stepper_.next(corners[0])) - stepper_.next(corners[1]) - stepper_.next(corners[2]) +
+                    stepper_.next(corners[3])) /
+                   (4 * axis_.spacing * axis_.spacing);
+  return bend;
+}
+
+// Moves a part from scores of zero to a cell.
+template <int Most>
+void BeliefStep<Most>::take_cell(Part& part, std::size_t trial, const Cell& cell) const {
+  const Eigen::Index before = states() + static_cast<Eigen::Index>(stepper_.offsets());
+  const std::size_t axes = plan_.lattice.size(), n = axis_.points.size();
+  const Bend bend = bend_at(trial, cell);
+  std::array<double, 2> off{}, variance{};
+  for (std::size_t b = 0, rest = cell.anchor; b < axes; ++b, rest /= n) {
+    off[b] = cell.by_score[b].mean - axis_.points[rest % n];
+    variance[b] = cell.by_score[b].variance;
+  }
+  for (std::size_t b = 0; b < axes; ++b) {
+    const double sd = std::sqrt(variance[b]);
+    part.mean.head(states()) += (bend.first[b] + 0.5 * off[b] * bend.second[b]) * off[b];
     Vector column = Vector::Zero(part.mean.size());
-    column.head(states()) = (first + second * off) * sd;
+    column.head(states()) = (bend.first[b] + off[b] * bend.second[b] + off[1 - b] * bend.second[2]) * sd;
     if (stepper_.remembers()) {
       const double fresh = std::sqrt(1 - std::pow(stepper_.memory(plan_.lattice[b]), 2));
-      part.mean[before + static_cast<Eigen::Index>(plan_.lattice[b])] += fresh * mean;
+      part.mean[before + static_cast<Eigen::Index>(plan_.lattice[b])] += fresh * cell.by_score[b].mean;
       column[before + static_cast<Eigen::Index>(plan_.lattice[b])] = fresh * sd;
     }
+    if (bent_) column[part.mean.size() - bent() + static_cast<Eigen::Index>(b)] = sd;
     part.covariance += column * column.transpose();
-    part.covariance.topLeftCorner(states(), states()) += 0.5 * variance * variance * second * second.transpose();
   }
+  part.mean.head(states()) += off[0] * off[1] * bend.second[2];
+  if (bent_) {
+    part.bent = static_cast<int>(axes);
+    part.bends = bend.second;
+    return;
+  }
+  for (std::size_t b = 0; b < axes; ++b) {
+    part.mean.head(states()) += 0.5 * variance[b] * bend.second[b];
+    part.covariance.topLeftCorner(states(), states()) +=
+        0.5 * variance[b] * variance[b] * bend.second[b] * bend.second[b].transpose();
+  }
+  part.covariance.topLeftCorner(states(), states()) +=
+      variance[0] * variance[1] * bend.second[2] * bend.second[2].transpose();
 }
 
 template <int Most>

@@ -32,7 +32,8 @@ class BeliefStep {
   using Part = typename BeliefMixture<Most>::Part;
 
   /// @param shared  sensors that share errors between rows
-  BeliefStep(MachineStepper& stepper, const ScorePlan& plan, std::size_t shared);
+  /// @param bent    parts stay bent in the scores of the lattice, which then are the last numbers of the vector
+  BeliefStep(MachineStepper& stepper, const ScorePlan& plan, std::size_t shared, bool bent);
   /// Steps beliefs, all in one call of the machine's map, and hands on what comes of each, in their order.
   /// @param take  is given the number of the belief and its distribution after the step, which it may change
   void step(std::span<const TransitionPlace> places, std::span<const Part> beliefs,
@@ -85,13 +86,17 @@ class BeliefStep {
   Matrix columns(const Matrix& slope, const Matrix& root) const;
   Part part(const Slopes& slopes, const Part& belief, const Matrix& root) const;
   Cell cell(std::size_t trial, std::size_t point, std::span<const Line> lines) const;
+  struct Bend;
+  Bend bend_at(std::size_t trial, const Cell& cell) const;
   void take_cell(Part& part, std::size_t trial, const Cell& cell) const;
+  Eigen::Index bent() const { return bent_ ? static_cast<Eigen::Index>(plan_.lattice.size()) : 0; }
   void on_lattice(AfterStep<Most>& after, std::size_t trial, const Part& belief, const Matrix& root,
                   std::span<const Line> lines) const;
 
   MachineStepper& stepper_;
   ScorePlan plan_;
   std::size_t shared_;
+  bool bent_;
   LatticeAxis axis_;
   std::vector<std::size_t> straight_;  // scores that are not on the lattice
   std::vector<Eigen::Index> used_;     // columns of the roots that move points

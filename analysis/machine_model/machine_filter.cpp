@@ -19,6 +19,11 @@ bool unseen(const MachineRow& row) {
   return std::ranges::all_of(row.seen, [](double x) { return std::isnan(x); });
 }
 
+// Several columns of a row are moved by the same noise: seen one after another, they need to know how they bend.
+int bent_numbers(const Machine& machine, const ScorePlan& plan) {
+  return machine.observe.size() > 1 ? static_cast<int>(plan.lattice.size()) : 0;
+}
+
 // Follows all trials of the runs under one hypothesis.
 template <int Most>
 class Follower {
@@ -32,6 +37,7 @@ class Follower {
       shared_.push_back(machine.observe[j].correlation != 0 ? shared_count_++ : -1);
       scale_.push_back(column_spread(runs, j).sd);
     }
+    bent_ = bent_numbers(machine, plan);
     std::size_t number = 0;
     for (const MachineTrial& trial : runs.trials) {
       first_.push_back(number);
@@ -61,6 +67,7 @@ class Follower {
   std::vector<Eigen::Index> state_;  // by sensor
   std::vector<int> shared_;          // by sensor: which of those that share errors; -1: none
   int shared_count_ = 0;
+  int bent_ = 0;                    // numbers of the vector in which beliefs are bent
   std::vector<double> scale_;       // by sensor: spread of its column
   std::vector<std::size_t> first_;  // by trial: number of its first transition
   Evaluation out_;
@@ -150,10 +157,16 @@ typename BeliefMixture<Most>::Part Follower<Most>::see(AfterStep<Most>& after, c
   } else {
     after.belief.add_outlier(supposed_.outliers, outlier_width, static_cast<Eigen::Index>(stepper_.states()));
     after.belief.add_wild(supposed_.wild, wild_width);
+    std::vector<Look<Most>> looks;
+    std::vector<double> values;
     for (std::size_t j = 0; j < state_.size(); ++j) {
       if (std::isnan(row.seen[j])) continue;
-      put(event++, after.belief.see(look(j, kept + shared_count_), row.seen[j], failed),
-          failed > 0 ? failed_in(after) : 0);
+      looks.push_back(look(j, kept + shared_count_ + bent_));
+      values.push_back(row.seen[j]);
+    }
+    if (bent_ > 0) after.belief.straighten(looks, values);
+    for (std::size_t i = 0; i < looks.size(); ++i) {
+      put(event++, after.belief.see(looks[i], values[i], failed), failed > 0 ? failed_in(after) : 0);
       failed = 0;
     }
   }
@@ -174,7 +187,7 @@ Evaluation Follower<Most>::follow(const std::vector<Event>& events, std::vector<
   std::vector<Part> beliefs;
   for (const MachineTrial& trial : runs_.trials)
     beliefs.push_back(trial.rows.empty() ? Part{} : launched(trial.rows.front()));
-  BeliefStep<Most> stepping(stepper_, plan_, static_cast<std::size_t>(shared_count_));
+  BeliefStep<Most> stepping(stepper_, plan_, static_cast<std::size_t>(shared_count_), bent_ > 0);
   for (std::size_t k = 0; k < runs_.longest(); ++k) {
     std::vector<TransitionPlace> places;
     std::vector<Part> before;
@@ -245,6 +258,7 @@ Evaluation follow_machine(const Machine& machine, const MachineRuns& runs, const
   std::size_t size = machine.states.size() + supposed.spreads.size() + static_cast<std::size_t>(machine.scores);
   if (!supposed.memory.empty()) size += static_cast<std::size_t>(machine.scores);
   for (const MachineSensor& sensor : machine.observe) size += sensor.correlation != 0 ? 2 : 0;
+  size += static_cast<std::size_t>(bent_numbers(machine, plan));
   if (size <= small_belief) return Follower<small_belief>(machine, runs, plan, supposed).follow(events, chances);
   return Follower<Eigen::Dynamic>(machine, runs, plan, supposed).follow(events, chances);
 }

@@ -6,8 +6,10 @@
 
 #include <Eigen/Dense>
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <numbers>
+#include <random>
 #include <vector>
 
 #include "dynamics/numerics/truncated_normal.h"
@@ -96,6 +98,60 @@ TEST(MachineFilter, ScoresOfASkewedLandingAreNormal) {
     const Evaluation evaluation = followed(machine, runs, nominal_of(machine));
     ASSERT_EQ(evaluation.score.size(), 20000u);
     EXPECT_LT(kolmogorov(evaluation.score), 1.63) << error;  // 1 % of normal samples exceed it
+  }
+}
+
+// Two columns that the same two noises move along one curve, as the speeds before and after a collision are moved: the
+// second, given the first, is known to the error of its measurement.
+TEST(MachineFilter, ScoresOfColumnsThatBendTogetherAreNormal) {
+  Machine machine = linear_machine(0.01);
+  machine.scores = 2;
+  machine.states = {"p", "q"};
+  machine.parameters = {{"push", 0.3, 0.1}};
+  machine.effects.clear();
+  machine.may_vary.clear();
+  machine.observe = {{"q", 0.01, 0}, {"p", 0.01, 0}};
+  const auto next = [](double push, const double* state, const double* z) {
+    const double p = push + 0.5 * state[0] + 0.2 * z[0] + 0.06 * z[0] * z[0] + 0.1 * z[1] + 0.05 * z[0] * z[1];
+    return std::array{p, 2 + 0.8 * p + 0.3 * p * p};
+  };
+  machine.step = [&](const MachineBatch& batch) {
+    for (std::size_t i = 0; i < batch.rows; ++i) {
+      const auto [p, q] = next(batch.value(0, i), &batch.states[2 * i], &batch.scores[2 * i]);
+      batch.next[2 * i] = p;
+      batch.next[2 * i + 1] = q;
+      batch.failed[i] = 0;
+    }
+  };
+  std::mt19937_64 generator(8);
+  std::normal_distribution<double> normal;
+  MachineRuns runs;
+  for (int trial = 0; trial < 100; ++trial) {
+    runs.trials.emplace_back();
+    std::array state{0.6, 3.0};
+    for (int row = 0; row < 21; ++row) {
+      runs.trials.back().rows.push_back(
+          {.seen = {state[1] + 0.01 * normal(generator), state[0] + 0.01 * normal(generator)}});
+      const std::array z{normal(generator), normal(generator)};
+      state = next(0.3, state.data(), z.data());
+    }
+  }
+  MachineHypothesis h = nominal_of(machine);
+  const ScorePlan plan = score_plan(machine, runs, h);
+  ASSERT_EQ(plan.lattice.size(), 2u);
+  const std::vector<Event> events = machine_events(machine, runs, plan);
+  const Evaluation evaluation = follow_machine(machine, runs, plan, events, h);
+  for (const std::size_t column : {0u, 1u}) {
+    std::vector<double> scores;
+    double square = 0;
+    for (std::size_t e = 0; e < events.size(); ++e)
+      if (events[e].column == column) {
+        scores.push_back(evaluation.score[e]);
+        square += scores.back() * scores.back() / 2000;
+      }
+    ASSERT_EQ(scores.size(), 2000u);
+    EXPECT_LT(kolmogorov(scores), 1.63) << column;
+    EXPECT_NEAR(square, 1, 3 * std::sqrt(2.0 / 2000)) << column;
   }
 }
 
