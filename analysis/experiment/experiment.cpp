@@ -220,6 +220,7 @@ ExperimentSource read_source(const fs::path& folder) {
   source.collisions_csv = read_text(folder / "collisions.csv", defects);
   source.trials_csv = read_text(folder / "trials.csv", defects);
   source.angle_csv = read_text(folder / "angle.csv", defects);
+  source.steps_csv = read_text(folder / "steps.csv", defects);
   defects.check();
   return source;
 }

@@ -110,6 +110,7 @@ struct ExperimentSource {
   std::string folder;  ///< as messages name it
   std::string experiment_toml;
   std::optional<std::string> collisions_csv, trials_csv, angle_csv;  ///< nothing: no such file
+  std::optional<std::string> steps_csv = {};                         ///< of walks
 };
 
 /// Reads the files there are. @throws InputError if experiment.toml is not there or a file cannot be read

@@ -279,7 +279,7 @@ void parse_experiment_toml(const std::string& file, std::string_view text, Exper
     if (*system == "coast_down")
       experiment.system = System::coast_down;
     else if (*system != "rimless_wheel")
-      root.report(*root.find("system", true), "system: \"rimless_wheel\" or \"coast_down\" is expected");
+      root.report(*root.find("system", true), "system: \"rimless_wheel\", \"coast_down\" or \"machine\" is expected");
   }
   if (experiment.system == System::rimless_wheel) {
     read_contact(root, experiment.contact);
@@ -294,6 +294,47 @@ void parse_experiment_toml(const std::string& file, std::string_view text, Exper
     keys->finish();
   }
   root.finish();
+}
+
+std::optional<WalkDescription> parse_walk_toml(const std::string& file, std::string_view text, Defects& defects) {
+  Defects other;  // a text that is no TOML is for the reader of wheels to refuse
+  const std::optional<toml::table> table = parse(file, text, other);
+  if (!table || table->get("system") == nullptr || table->get("system")->value<std::string>() != "machine")
+    return std::nullopt;
+  Keys root(file, *table, "", defects);
+  WalkDescription walks;
+  root.find("system", true);
+  walks.title = root.text("title", false).value_or("");
+  if (std::optional<Keys> machine = root.table("machine", true)) {
+    walks.walker = machine->text("model", true).value_or("compass");
+    if (walks.walker != "compass" && walks.walker != "simplest")
+      machine->report(*machine->find("model", true),
+                      fmt::format("machine.model: {} is none of \"compass\", \"simplest\"", shown_text(walks.walker)));
+    if (std::optional<Keys> known = machine->table("parameters", true)) {
+      constexpr Range degrees{.low = 0, .high = 45, .high_open = true};
+      walks.slope_deg = known->spread("slope_deg", true, degrees).value_or(Spread{3, 0.1});
+      walks.slope_sd_deg = known->spread("slope_sd_deg", true, degrees).value_or(Spread{0.5, 0.5});
+      if (!(walks.slope_deg.mean > 0) || !(walks.slope_sd_deg.mean > 0))
+        known->report(*machine->find("parameters", true), "machine.parameters: a mean of 0 is outside (0, 45)");
+      known->finish();
+    }
+    machine->finish();
+  }
+  if (std::optional<Keys> columns = root.table("columns", true)) {
+    std::vector<std::string> states{"half_angle_rad", "stance_rate_rad_s"};
+    if (walks.walker == "compass") states.emplace_back("swing_rate_rad_s");
+    for (const std::string& state : states)
+      if (std::optional<Keys> column = columns->table(state, false)) {
+        walks.columns.push_back({state, column->number("sd", false, {.low = 0, .high = 1000}),
+                                 column->number("correlation", false, {.low = -0.5, .high = 0.5}).value_or(0)});
+        column->finish();
+      }
+    columns->finish();
+    if (walks.columns.empty())
+      root.report(*root.find("columns", true), "columns: none is stated, nothing was measured");
+  }
+  root.finish();
+  return walks;
 }
 
 }  // namespace metastable::analysis

@@ -1,8 +1,10 @@
 #pragma once
 // Turns experiment.toml into data; toml++ stays inside experiment_toml.cpp.
 
+#include <optional>
 #include <string>
 #include <string_view>
+#include <vector>
 
 #include "analysis/experiment/experiment.h"
 #include "analysis/experiment/input_error.h"
@@ -13,5 +15,20 @@ namespace metastable::analysis {
 /// is missing, unknown, of the wrong type or out of range.
 /// @param file name for messages
 void parse_experiment_toml(const std::string& file, std::string_view text, Experiment& experiment, Defects& defects);
+
+/// Holds what experiment.toml says of walks: which built-in walker, and what is known of it and of its sensors.
+struct WalkDescription {
+  struct Column {
+    std::string state;
+    std::optional<double> sd;  ///< of its error; nothing: to be fitted
+    double correlation = 0;    ///< of neighbouring rows' errors
+  };
+  std::string title, walker;
+  Spread slope_deg, slope_sd_deg;  ///< nominal value, and sd with which it is known
+  std::vector<Column> columns;     ///< those that were measured
+};
+
+/// Reads experiment.toml of walks, `system = "machine"`. Nothing where the file states another system, or none.
+std::optional<WalkDescription> parse_walk_toml(const std::string& file, std::string_view text, Defects& defects);
 
 }  // namespace metastable::analysis

@@ -40,8 +40,10 @@ analysis::Setting stand_in_base(const Options& o, const Pairs& pairs) {
 void add_laboratory_options(Options& o) {
   o.group("The virtual laboratory (--reality)");
   o.add_flag("reality", "In the virtual laboratory: motion in continuous time, sharing no formula with the model");
-  o.add("effect", "ID:NAME=VALUE,...", "",
-        "With --reality, repeatable: an effect the model lacks, e.g. leg_contact:leg=3,friction_ratio=1.4");
+  o.add(
+      "effect", "ID:NAME=VALUE,...", "",
+      "With --reality or --walker, repeatable: an effect the model lacks, e.g. leg_contact:leg=3,friction_ratio=1.4 or "
+      "hip_damping:damping=0.3");
   o.add("outside", "ID:SIZE", "",
         "With --reality, repeatable: an effect outside the catalogue (sloshing_fluid, planks, frame_resonance, "
         "stored_energy, speed_spread, double_plate, warming_feet, two_crews, loose_feet, second_memory, crosswind, "
@@ -298,9 +300,20 @@ SimulateRequest simulate_request(const Options& o, const std::string& line, cons
 }
 
 WalkerRequest walker_simulate_request(const Options& o, const std::string& line) {
-  WalkerRequest walker = walker_request(o, line, {"trials", "collisions"});
+  WalkerRequest walker = walker_request(o, line, {"trials", "collisions", "effect"});
   walker.walks.trials = o.whole("trials", 1, 1000000);
   if (o.given("collisions")) walker.walks.longest = o.whole("collisions", 1, 1000000);
+  for (const std::string& text : o.all("effect")) {
+    const std::vector<std::string> parts = split(text, ':');
+    if (parts.size() != 2)
+      throw std::invalid_argument(fmt::format("--effect: '{}' is not of the form ID:NAME=VALUE,...", text));
+    for (const std::string& one : split(parts[1], ',')) {
+      const std::vector<std::string> both = split(one, '=');
+      if (both.size() != 2)
+        throw std::invalid_argument(fmt::format("--effect: '{}' is not of the form ID:NAME=VALUE,...", text));
+      walker.effects.emplace_back(parts[0] + "." + both[0], number_value("effect", both[1]));
+    }
+  }
   return walker;
 }
 

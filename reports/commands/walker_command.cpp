@@ -6,6 +6,7 @@
 #include <optional>
 #include <stdexcept>
 
+#include "analysis/walker_model/walk_folder.h"
 #include "analysis/walkers/walker_falls.h"
 #include "reports/commands/sweep_file.h"
 #include "reports/output/interrupt.h"
@@ -137,13 +138,46 @@ void run_walker_sweep(const WalkerRequest& request) {
   });
 }
 
+namespace {
+
+void say_walks(Answer& answer, const WalkerRequest& request, std::size_t trials, std::size_t fallen,
+               const Provenance& provenance) {
+  answer.say("{}: {} trials, {} of them fell", request.out, trials, fallen);
+  answer.fact("folder", request.out);
+  answer.fact("trials", trials);
+  answer.fact("fell", fallen);
+  answer.finish(provenance);
+}
+
+void write_experiment(const WalkerRequest& request, OutputFolder& whole) {
+  Answer answer(request.json);
+  const analysis::WalkFiles files = [&] {
+    ProgressParts progress;
+    analysis::WalkOptions options = request.walks;
+    options.progress = [tell = progress.begin()("simulate")](double share) { tell(share, "simulate"); };
+    const WalkerSetting& setting = request.settings.front();
+    return analysis::draw_walks(setting, request.effects, options,
+                                fmt::format("Walker {}, simulated", analysis::walker_name(setting.walker)));
+  }();
+  write_file(whole.path() / "experiment.toml", files.experiment_toml);
+  write_file(whole.path() / "steps.csv", files.steps_csv);
+  write_file(whole.path() / "trials.csv", files.trials_csv);
+  whole.commit("experiment.toml");
+  say_walks(answer, request, request.walks.trials, files.fallen, walker_provenance(request));
+}
+
+}  // namespace
+
 void run_walker_simulate(const WalkerRequest& request) {
   const WalkerSetting& setting = request.settings.front();
   const std::filesystem::path folder = request.out;
-  for (const char* name : {"walks.csv", "trials.csv", "experiment.toml"})
+  for (const char* name : {"walks.csv", "steps.csv", "trials.csv", "experiment.toml"})
     if (std::filesystem::exists(folder / name))
       throw OutputError(folder, fmt::format("already holds {}; choose another folder", name));
+  if (setting.terrain != dynamics::Terrain::fresh && !request.effects.empty())
+    throw std::invalid_argument("--effect: has no meaning with --terrain facets");
   OutputFolder whole(folder);
+  if (setting.terrain == dynamics::Terrain::fresh) return write_experiment(request, whole);
   Answer answer(request.json);
   const std::vector<analysis::Walk> walks = [&] {
     ProgressParts progress;
@@ -168,11 +202,7 @@ void run_walker_simulate(const WalkerRequest& request) {
   write_file(whole.path() / "walks.csv", head + steps);
   write_file(whole.path() / "trials.csv", head + trials);
   whole.commit("trials.csv");
-  answer.say("{}: {} trials, {} of them fell", request.out, walks.size(), fallen);
-  answer.fact("folder", request.out);
-  answer.fact("trials", walks.size());
-  answer.fact("fell", fallen);
-  answer.finish(provenance);
+  say_walks(answer, request, walks.size(), fallen, provenance);
 }
 
 void run_walker_report(const WalkerRequest& request) {

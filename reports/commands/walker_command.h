@@ -4,6 +4,7 @@
 #include <cstddef>
 #include <optional>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "analysis/statistics/last_moments.h"
@@ -17,14 +18,15 @@ namespace metastable::reports {
 struct WalkerRequest {
   std::vector<analysis::WalkerSetting> settings;  ///< one or more
   markov::MeshStudyOptions study;
-  std::string json;                         ///< file, "-" for standard output, "" for none
-  std::string out;                          ///< file of a sweep, folder of trials or of a report
-  std::string command;                      ///< the command line, for provenance
-  bool how_it_fails = false;                ///< of steps
-  double time_limit = usual_time_limit;     ///< of steps [s]
-  std::vector<double> slopes, slope_sds;    ///< [deg], the axes of a sweep: settings slope by slope
-  analysis::WalkOptions walks = {};         ///< of simulate
-  const struct Sharing* sharing = nullptr;  ///< of a sweep, with other processes
+  std::string json;                                          ///< file, "-" for standard output, "" for none
+  std::string out;                                           ///< file of a sweep, folder of trials or of a report
+  std::string command;                                       ///< the command line, for provenance
+  bool how_it_fails = false;                                 ///< of steps
+  double time_limit = usual_time_limit;                      ///< of steps [s]
+  std::vector<double> slopes, slope_sds;                     ///< [deg], the axes of a sweep: settings slope by slope
+  analysis::WalkOptions walks = {};                          ///< of simulate
+  std::vector<std::pair<std::string, double>> effects = {};  ///< of simulate: "hip_damping.damping" and values
+  const struct Sharing* sharing = nullptr;                   ///< of a sweep, with other processes
 };
 
 /// Holds what `steps` and `compare` find; moments where they were asked for.
@@ -50,7 +52,8 @@ void run_walker_compare(const WalkerRequest& request);
 /// Writes expected steps over slopes and their sds; it is taken up again like every sweep.
 void run_walker_sweep(const WalkerRequest& request);
 
-/// Writes walks.csv (every step) and trials.csv in a new folder.
+/// Writes an experiment folder of walks (experiment.toml, steps.csv, trials.csv); with terrain that remembers,
+/// walks.csv (every step, exact) and trials.csv.
 void run_walker_simulate(const WalkerRequest& request);
 
 /// Writes the page of walkers: numbers, section, last steps.

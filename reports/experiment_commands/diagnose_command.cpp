@@ -7,6 +7,7 @@
 
 #include "analysis/diagnosis/diagnosis_sentences.h"
 #include "analysis/experiment_model/diagnose.h"
+#include "analysis/walker_model/walk_folder.h"
 #include "dynamics/wheel/contact_law.h"
 #include "reports/diagnosis/diagnosis_figures.h"
 #include "reports/diagnosis/diagnosis_json.h"
@@ -113,7 +114,10 @@ void write_diagnosis(const analysis::Diagnosis& d, const std::string& title, con
 }
 
 void run_diagnose(const DiagnoseRequest& request) {
-  const analysis::Experiment experiment = analysis::read_experiment(request.folder);
+  const std::optional<analysis::Walks> walks = analysis::read_walks(request.folder);
+  std::optional<analysis::Experiment> experiment;
+  if (!walks) experiment = analysis::read_experiment(request.folder);
+  const std::string title = walks ? walks->title : experiment->title;
   std::optional<FolderIfFilled> folder;
   if (!request.out.empty()) folder.emplace(request.out);
   std::optional<OutputFile> json;
@@ -122,14 +126,13 @@ void run_diagnose(const DiagnoseRequest& request) {
     Progress progress("diagnose", study_units);
     analysis::DiagnosisOptions options = request.options;
     options.progress = study_progress(progress);
-    return analysis::diagnose(experiment, options);
+    return walks ? analysis::diagnose_walks(*walks, options) : analysis::diagnose(*experiment, options);
   }();
-  const Provenance provenance{request.command, "experiment: " + experiment.title, request.options.seed, version()};
+  const Provenance provenance{request.command, "experiment: " + title, request.options.seed, version()};
   if (!request.out.empty()) {
-    const bool wheel = experiment.system == analysis::System::rimless_wheel;
-    write_diagnosis(diagnosis, experiment.title,
-                    wheel ? std::string(dynamics::law_name(experiment.contact.law)) : std::string(), provenance,
-                    request.out);
+    const bool wheel = experiment && experiment->system == analysis::System::rimless_wheel;
+    write_diagnosis(diagnosis, title, wheel ? std::string(dynamics::law_name(experiment->contact.law)) : std::string(),
+                    provenance, request.out);
   }
   if (json) {
     json->stream() << diagnosis_json(diagnosis, provenance);

@@ -1,0 +1,271 @@
+#include "analysis/walker_model/walk_folder.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <map>
+#include <ranges>
+#include <span>
+#include <stdexcept>
+
+#include "analysis/experiment/csv_reader.h"
+#include "analysis/experiment/experiment_toml.h"
+#include "analysis/experiment/suggestion.h"
+#include "analysis/machine_model/machine_transitions.h"
+#include "analysis/statistics/random.h"
+#include "analysis/walkers/walker_study.h"
+#include "dynamics/numerics/truncated_normal.h"
+#include "dynamics/walkers/gait.h"
+
+namespace metastable::analysis {
+namespace {
+
+constexpr double angle_error = 0.0005, compass_rate_error = 0.005, simplest_rate_error = 0.001;
+constexpr std::int64_t most_steps = 1'000'000'000;
+constexpr dynamics::Range angles{.low = 0, .high = 1.5707963267948966, .low_open = true, .high_open = true};
+constexpr dynamics::Range rates{.low = -1000, .high = 1000};
+
+std::string file_in(const ExperimentSource& source, const char* name) {
+  return (std::filesystem::path(source.folder) / name).string();
+}
+
+// Reads steps.csv, and trials.csv, of walks.
+class WalkReader {
+ public:
+  WalkReader(const ExperimentSource& source, const Machine& machine, MachineRuns& runs, Defects& defects)
+      : source_(source), machine_(machine), runs_(runs), defects_(defects) {}
+
+  void read() {
+    runs_.conditions.clear();
+    const std::string file = file_in(source_, "steps.csv");
+    if (!source_.steps_csv) return defects_.add(file, {}, "there is no such file; walks need it");
+    std::vector<CsvColumn> columns{{"condition"}, {"trial", true}, {"step", true},
+                                   {"phase"},     {"time_s"},      {"position_m"}};
+    for (const MachineSensor& sensor : machine_.observe) columns.push_back({sensor.state});
+    CsvReader csv(file, *source_.steps_csv, columns, defects_);
+    for (const MachineSensor& sensor : machine_.observe)
+      if (!csv.has(state_ + static_cast<std::size_t>(&sensor - machine_.observe.data())))
+        defects_.add(file, {1, 1}, fmt::format("there is no column {}, which experiment.toml states", sensor.state));
+    if (csv.has(phase_)) runs_.phases = {"1", "2"};
+    while (csv.next()) read_row(csv);
+    if (runs_.trials.empty() && defects_.empty()) defects_.add(file, {}, "holds no step");
+    if (source_.trials_csv) read_outcomes();
+  }
+
+ private:
+  enum Columns : std::size_t { condition_, trial_, step_, phase_, time_, position_, state_ };
+  using Key = std::pair<std::string, std::int64_t>;
+
+  static std::string condition_of(const CsvReader& csv) {
+    return csv.text(condition_).empty() ? "all" : std::string(csv.text(condition_));
+  }
+
+  void read_row(CsvReader& csv) {
+    std::optional<std::int64_t> trial, step, phase;
+    std::optional<double> time, position;
+    const bool counted = csv.read(trial_, 1, most_steps, trial) && csv.read(step_, 1, most_steps, step);
+    csv.read(phase_, 1, 2, phase);
+    csv.read(time_, dynamics::range::time, time);
+    csv.read(position_, dynamics::range::position, position);
+    MachineRow row;
+    for (std::size_t j = 0; j < machine_.observe.size(); ++j) {
+      std::optional<double> value;
+      csv.read(state_ + j, machine_.observe[j].state == "half_angle_rad" ? angles : rates, value);
+      row.seen.push_back(value.value_or(std::nan("")));
+    }
+    if (!counted) return;
+    row.time = time.value_or(std::nan(""));
+    row.position = position.value_or(std::nan(""));
+    row.phase = phase ? static_cast<int>(*phase) - 1 : -1;
+    if (!machine_.inputs.empty()) {
+      if (!phase) return csv.refuse(phase_, "is missing: which leg stands, 1 or 2, is given in every row or in none");
+      row.inputs = {static_cast<double>(*phase)};
+    }
+    place(csv, {condition_of(csv), *trial}, *step, std::move(row));
+  }
+
+  void place(CsvReader& csv, Key key, std::int64_t step, MachineRow row) {
+    if (runs_.trials.empty() || key != last_) {
+      if (!trials_.emplace(key, runs_.trials.size()).second)
+        return csv.refuse(trial_, fmt::format("the rows of trial {} do not stand together", key.second));
+      auto at = std::ranges::find(runs_.conditions, key.first);
+      if (at == runs_.conditions.end()) at = runs_.conditions.insert(at, key.first);
+      runs_.trials.push_back({static_cast<std::size_t>(at - runs_.conditions.begin()), {}, {}});
+      last_ = key;
+    }
+    std::vector<MachineRow>& rows = runs_.trials.back().rows;
+    if (step != static_cast<std::int64_t>(rows.size()) + 1)
+      return csv.refuse(step_, fmt::format("{} is not due: step {} of trial {} is", step, rows.size() + 1, key.second));
+    rows.push_back(std::move(row));
+  }
+
+  void read_outcomes() {
+    constexpr CsvColumn columns[] = {{"condition"}, {"trial", true}, {"outcome", true}};
+    CsvReader csv(file_in(source_, "trials.csv"), *source_.trials_csv, columns, defects_);
+    while (csv.next()) {
+      std::optional<std::int64_t> trial;
+      if (!csv.read(1, 1, most_steps, trial)) continue;
+      const auto at = trials_.find({condition_of(csv), *trial});
+      if (at == trials_.end()) {
+        csv.refuse(1, fmt::format("steps.csv has no trial {}", *trial));
+        continue;
+      }
+      const std::string_view told = csv.text(2);
+      std::optional<MachineOutcome>& outcome = runs_.trials[at->second].outcome;
+      if (told == "failed")
+        outcome = MachineOutcome::failed;
+      else if (told == "stopped")
+        outcome = MachineOutcome::stopped;
+      else if (told == "lost")
+        outcome = MachineOutcome::lost;
+      else
+        csv.refuse(2, fmt::format("{} is none of failed, stopped, lost", shown_text(told)));
+    }
+  }
+
+  const ExperimentSource& source_;
+  const Machine& machine_;
+  MachineRuns& runs_;
+  Defects& defects_;
+  std::map<Key, std::size_t> trials_;
+  Key last_;
+};
+
+// Draws one walk: its rows behind the trial's number.
+class WalkDrawer {
+ public:
+  WalkDrawer(const Machine& machine, std::vector<double> values, const WalkOptions& options, double rate_error)
+      : machine_(machine), values_(std::move(values)), options_(options), rate_error_(rate_error) {}
+
+  // Returns whether it fell.
+  bool draw(std::size_t trial, std::vector<double> state, std::string& rows) {
+    std::vector<double> next(state.size());
+    std::uint64_t leg = trial % 2;
+    for (std::uint64_t step = 0; step < options_.longest; ++step, leg = 1 - leg) {
+      rows += fmt::format("{},{},{}", trial + 1, step + 1, leg + 1);
+      for (std::size_t s = 0; s < state.size(); ++s)
+        rows += fmt::format(",{:.9g}", state[s] + (s == 0 ? angle_error : rate_error_) * normal(trial, step, s + 1));
+      rows += "\n";
+      if (!machine_.inputs.empty()) values_.back() = static_cast<double>(leg + 1);
+      const double score = normal(trial, step, 0);
+      std::uint8_t fell = 0;
+      std::vector<std::span<const double>> spans;
+      for (const double& value : values_) spans.emplace_back(&value, 1);
+      machine_.step({1, state, {&score, 1}, spans, next, {&fell, 1}});
+      if (fell) return true;
+      state.swap(next);
+    }
+    return false;
+  }
+
+ private:
+  double normal(std::size_t trial, std::uint64_t step, std::size_t purpose) const {
+    return dynamics::normal_quantile(
+        uniform_at(options_.seed, trial, 4 * step + purpose, static_cast<std::uint64_t>(DrawStream::machine)));
+  }
+
+  const Machine& machine_;
+  std::vector<double> values_;
+  const WalkOptions& options_;
+  double rate_error_;
+};
+
+// Returns the machine's values with those of the effects.
+std::vector<double> values_with(const Machine& machine, const std::vector<std::pair<std::string, double>>& effects) {
+  std::vector<double> values;
+  std::vector<std::string> known;
+  for (const MachineParameter& parameter : machine.parameters) values.push_back(parameter.nominal);
+  const std::size_t first = values.size();
+  std::vector<const SuspectedParameter*> of;
+  for (const MachineEffect& effect : machine.effects)
+    for (const SuspectedParameter& parameter : effect.parameters) {
+      values.push_back(parameter.neutral);
+      known.push_back(effect.id + "." + parameter.name);
+      of.push_back(&parameter);
+    }
+  for (const auto& [name, value] : effects) {
+    require_word("--effect", name, known);
+    const auto at = static_cast<std::size_t>(std::ranges::find(known, name) - known.begin());
+    if (!(value >= of[at]->lower && value <= of[at]->upper))
+      throw std::invalid_argument(
+          fmt::format("--effect: {}: {} is outside [{}, {}]", name, value, of[at]->lower, of[at]->upper));
+    values[first + at] = value;
+  }
+  values.resize(values.size() + machine.inputs.size());
+  return values;
+}
+
+}  // namespace
+
+std::optional<Walks> read_walks(const std::filesystem::path& folder) {
+  const ExperimentSource source = read_source(folder);
+  Defects defects;
+  const auto told = parse_walk_toml(file_in(source, "experiment.toml"), source.experiment_toml, defects);
+  if (!told) return std::nullopt;
+  defects.check();
+  WalkerStatement statement;
+  statement.setting = {walker_from_name(told->walker), told->slope_deg.mean, told->slope_sd_deg.mean,
+                       dynamics::Terrain::fresh};
+  statement.slope_known_deg = told->slope_deg.sd;
+  statement.roughness_known_deg = told->slope_sd_deg.sd;
+  const std::vector<std::string> names =
+      source.steps_csv ? CsvReader::names(*source.steps_csv, {}) : std::vector<std::string>{};
+  statement.legs = std::ranges::find(names, "phase") != names.end();
+  auto machine = std::make_shared<Machine>(walker_machine(statement));
+  for (const WalkDescription::Column& column : told->columns)
+    machine->observe.push_back({column.state, column.sd, column.correlation});
+  Walks walks{told->title, {}, {}};
+  WalkReader(source, *machine, walks.runs, defects).read();
+  defects.check();
+  walks.machine = std::move(machine);
+  return walks;
+}
+
+Diagnosis diagnose_walks(const Walks& walks, const DiagnosisOptions& options) {
+  if (!options.elsewhere.empty()) throw std::invalid_argument("--at-slope, --at-speed: have no meaning with walks");
+  std::shared_ptr<const TransitionModel> model = machine_transitions(walks.machine, walks.runs);
+  const std::vector<std::string> known = model->effect_ids();
+  for (const std::string& entry : options.catalogue)
+    for (const auto id : std::views::split(entry, '+'))
+      require_word("--catalogue", std::string_view(id.begin(), id.end()), known);
+  return diagnose(std::move(model), options);
+}
+
+WalkFiles draw_walks(const WalkerSetting& setting, const std::vector<std::pair<std::string, double>>& effects,
+                     const WalkOptions& options, const std::string& title) {
+  WalkerStatement statement;
+  statement.setting = setting;
+  statement.legs = setting.walker == Walker::compass;
+  const Machine machine = walker_machine(statement);
+  const double rate_error = statement.legs ? compass_rate_error : simplest_rate_error;
+  const std::vector<double> start =
+      gait_state(setting, dynamics::find_gait(setting.map().walker(), setting.slope_deg * degree));
+  WalkFiles files;
+  files.experiment_toml = fmt::format(
+      "title = \"{}\"\nsystem = \"machine\"\n\n[machine]\nmodel = \"{}\"\n\n[machine.parameters]   # nominal value, "
+      "and the "
+      "sd with which it is known\nslope_deg = {{ mean = {}, sd = {} }}\nslope_sd_deg = {{ mean = {}, sd = {} }}\n\n"
+      "[columns]              # sd of the error of a measured value\n",
+      title, walker_name(setting.walker), setting.slope_deg, statement.slope_known_deg, setting.slope_sd_deg,
+      setting.slope_sd_deg);
+  files.steps_csv = "trial,step,phase";
+  for (const std::string& state : machine.states) {
+    files.steps_csv += "," + state;
+    files.experiment_toml +=
+        fmt::format("{} = {{ sd = {} }}\n", state, state == "half_angle_rad" ? angle_error : rate_error);
+  }
+  files.steps_csv += "\n";
+  files.trials_csv = "trial,outcome\n";
+  WalkDrawer drawer(machine, values_with(machine, effects), options, rate_error);
+  for (std::size_t trial = 0; trial < options.trials; ++trial) {
+    const bool fell = drawer.draw(trial, start, files.steps_csv);
+    files.fallen += fell;
+    files.trials_csv += fmt::format("{},{}\n", trial + 1, fell ? "failed" : "stopped");
+    if (options.progress) options.progress(static_cast<double>(trial + 1) / static_cast<double>(options.trials));
+  }
+  return files;
+}
+
+}  // namespace metastable::analysis

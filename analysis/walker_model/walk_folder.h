@@ -1,0 +1,50 @@
+#pragma once
+// Experiment folders of walks (experiment.toml, steps.csv, trials.csv): read, drawn and written.
+
+#include <filesystem>
+#include <memory>
+#include <optional>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "analysis/diagnosis/diagnosis.h"
+#include "analysis/experiment/experiment.h"
+#include "analysis/machine_model/machine_runs.h"
+#include "analysis/walker_model/walker_machine.h"
+#include "analysis/walkers/walker_trials.h"
+
+namespace metastable::analysis {
+
+/// Holds a folder of walks: the machine that they are of, and what was measured.
+struct Walks {
+  std::string title;
+  std::shared_ptr<const Machine> machine;
+  MachineRuns runs;
+};
+
+/// Reads a folder whose experiment.toml states `system = "machine"`; nothing where it states another.
+/// Checks names, types and ranges of keys and columns, steps of a trial in order without gap, trials that stand
+/// together, and outcomes of those trials only.
+/// @throws InputError with the first 20 defects, each with file, line and column
+std::optional<Walks> read_walks(const std::filesystem::path& folder);
+
+/// @throws as machine_transitions() and diagnose(); std::invalid_argument for another slope or speed, which
+///   walks do not have, and for an effect of the catalogue that this machine does not know
+Diagnosis diagnose_walks(const Walks& walks, const DiagnosisOptions& options);
+
+/// Holds the three files as text.
+struct WalkFiles {
+  std::string experiment_toml, steps_csv, trials_csv;
+  std::size_t fallen = 0;
+};
+
+/// Draws walks of a walker with effects, as WalkOptions says, which start in the gait of the ideal one, and measures
+/// them with errors of 0.0005 rad and, for the rates, 0.005 rad/s (simplest: 0.001). A row is a state just after a
+/// strike.
+/// @param effects  parameters of walker_machine()'s effects, "hip_damping.damping" and values
+/// @throws std::invalid_argument for an effect or value that the machine does not have
+WalkFiles draw_walks(const WalkerSetting& setting, const std::vector<std::pair<std::string, double>>& effects,
+                     const WalkOptions& options, const std::string& title);
+
+}  // namespace metastable::analysis
