@@ -229,7 +229,7 @@ Diagnosis diagnose_walks(const Walks& walks, const DiagnosisOptions& options) {
   const std::vector<std::string> known = model->effect_ids();
   for (const std::string& entry : options.catalogue)
     for (const auto id : std::views::split(entry, '+'))
-      require_word("--catalogue", std::string_view(id.begin(), id.end()), known);
+      require_word("catalogue", std::string_view(id.begin(), id.end()), known);
   return diagnose(std::move(model), options);
 }
 

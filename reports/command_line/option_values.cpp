@@ -210,7 +210,6 @@ std::vector<std::string> catalogue_value(std::string_view name, const std::strin
   std::vector<std::string> ids;
   const auto take = [&ids](std::string_view word, const std::string& where) {
     const std::string id(trimmed(word));
-    for (const std::string_view one : split(id, '+')) analysis::require_word(where, one, effect_ids());
     if (std::ranges::count(id, '+') > 1)
       throw std::invalid_argument(fmt::format("{}: \"{}\" has more than two effects", where, id));
     if (std::find(ids.begin(), ids.end(), id) == ids.end()) ids.push_back(id);

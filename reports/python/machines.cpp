@@ -12,6 +12,7 @@
 #include "analysis/diagnosis/diagnosis.h"
 #include "analysis/experiment/suggestion.h"
 #include "analysis/machine_model/machine_transitions.h"
+#include "analysis/walker_model/walk_folder.h"
 #include "reports/command_line/requests.h"
 #include "reports/output/version.h"
 #include "reports/python/answer.h"
@@ -156,6 +157,24 @@ py::dict diagnose_machine(const py::dict& machine_fields, const py::dict& runs_f
   return diagnosis_answer(found, {command, "machine: " + machine->name, study.seed, version()});
 }
 
+// Returns nothing for a folder that holds no walks.
+py::object diagnose_walks(const std::string& folder, const py::dict& options, const std::string& command,
+                          const py::object& progress) {
+  std::optional<analysis::Walks> walks;
+  Call call(progress);
+  call.run([&] { walks = analysis::read_walks(folder); });
+  if (!walks) return py::none();
+  const Arguments given(options);
+  analysis::DiagnosisOptions study;
+  study.seed = given.whole("seed", 0, UINT64_MAX);
+  study.threads = static_cast<int>(given.whole("threads", 0, 1024));
+  study.catalogue = given.texts("catalogue");
+  study.progress = [&](double share, const std::string& doing) { call.tell(share, doing); };
+  analysis::Diagnosis found;
+  call.run([&] { found = analysis::diagnose_walks(*walks, study); });
+  return diagnosis_answer(found, {command, "experiment: " + walks->title, study.seed, version()});
+}
+
 }  // namespace
 
 void add_machines(py::module_& module) {
@@ -165,6 +184,7 @@ void add_machines(py::module_& module) {
     machine->require_valid();
   });
   module.def("diagnose_machine", diagnose_machine);
+  module.def("diagnose_walks", diagnose_walks);
 }
 
 }  // namespace metastable::reports::python

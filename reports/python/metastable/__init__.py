@@ -576,7 +576,7 @@ def _experiment(what):
 def diagnose(experiment, machine=None, *, catalogue=(), at_slope=None, at_speed=None, seed=1, threads=0, progress=None):
     """What the nominal model of an experiment lacks: is there a gap, where, which effect causes it, how far it shrinks.
 
-    experiment  an Experiment, or the path of an experiment folder; or Runs of a machine of your own
+    experiment  an Experiment, or the path of an experiment folder, of walks too; or Runs of a machine of your own
     machine     that the runs are of: a Machine
     catalogue   effects to consider, ids of effects(); a pair "a+b" is tried in any case; none: all
     at_slope    [deg] the machine's expected steps on another slope, too
@@ -596,6 +596,12 @@ def diagnose(experiment, machine=None, *, catalogue=(), at_slope=None, at_speed=
         with _progress.telling(progress, "diagnose") as tell:
             return Diagnosis(_metastable.diagnose_machine(machine._fields(), experiment._laid_out, options, command, tell))
     with _progress.telling(progress, "diagnose") as tell:
+        if not isinstance(experiment, Experiment):
+            walks = _metastable.diagnose_walks(os.fspath(experiment), options, command, tell)
+            if walks is not None:
+                if at_slope is not None or at_speed is not None:
+                    raise InputError("at_slope, at_speed: have no meaning with walks")
+                return Diagnosis(walks)
         return Diagnosis(_metastable.diagnose(_experiment(experiment), options, command, tell))
 
 

@@ -1,0 +1,118 @@
+// Folders of walks: what is drawn is read, and bad files are named with their place.
+
+#include "analysis/walker_model/walk_folder.h"
+
+#include <gtest/gtest.h>
+
+#include <filesystem>
+#include <fstream>
+#include <functional>
+#include <string>
+
+#include "analysis/experiment/input_error.h"
+#include "tests/message_of.h"
+
+namespace metastable::analysis::test {
+namespace {
+
+namespace fs = std::filesystem;
+
+class WalkFolder : public ::testing::Test {
+ protected:
+  WalkFolder() : folder_(fs::path(::testing::TempDir()) / fs::path("walk_folder_test")) {
+    fs::remove_all(folder_);
+    fs::create_directories(folder_);
+  }
+  ~WalkFolder() override { fs::remove_all(folder_); }
+
+  void write(const WalkFiles& files) const {
+    put("experiment.toml", files.experiment_toml);
+    put("steps.csv", files.steps_csv);
+    put("trials.csv", files.trials_csv);
+  }
+  void put(const char* name, const std::string& text) const { std::ofstream(folder_ / name) << text; }
+  std::string refused() const {
+    return message_of<InputError>([&] { read_walks(folder_); });
+  }
+
+  fs::path folder_;
+};
+
+WalkFiles drawn(const std::vector<std::pair<std::string, double>>& effects = {}, std::size_t trials = 6,
+                Walker walker = Walker::compass) {
+  WalkerSetting setting{walker, walker_slope_deg(walker), walker == Walker::compass ? 0.3 : 0.05,
+                        dynamics::Terrain::fresh};
+  WalkOptions options;
+  options.trials = trials;
+  options.longest = 12;
+  return draw_walks(setting, effects, options, "drawn");
+}
+
+TEST_F(WalkFolder, HoldsWhatWasDrawn) {
+  for (const Walker walker : {Walker::compass, Walker::simplest}) {
+    write(drawn({}, 6, walker));
+    const auto walks = read_walks(folder_);
+    ASSERT_TRUE(walks);
+    EXPECT_EQ(walks->title, "drawn");
+    EXPECT_EQ(walks->machine->name, walker_name(walker));
+    EXPECT_EQ(walks->machine->observe.size(), walker == Walker::compass ? 3u : 2u);
+    ASSERT_EQ(walks->runs.trials.size(), 6u);
+    EXPECT_TRUE(walks->runs.trials[5].outcome.has_value());
+    EXPECT_EQ(walks->runs.trials[1].rows.front().phase, 1) << "trials take turns with the leg they start from";
+  }
+}
+
+TEST_F(WalkFolder, AnotherSystemIsNoFolderOfWalks) {
+  put("experiment.toml", "title = \"a wheel\"\n");
+  EXPECT_FALSE(read_walks(folder_));
+}
+
+TEST_F(WalkFolder, WhatIsWrongIsNamedWithItsPlace) {
+  const WalkFiles files = drawn();
+  const auto with = [&](std::string WalkFiles::*which, const std::string& from, const std::string& to) {
+    WalkFiles changed = files;
+    std::string& text = changed.*which;
+    const std::size_t at = text.find(from);
+    EXPECT_NE(at, std::string::npos) << from;
+    text.replace(at, from.size(), to);
+    write(changed);
+    return refused();
+  };
+  const auto has = [](const std::string& message, const std::string& part) {
+    EXPECT_NE(message.find(part), std::string::npos) << message;
+  };
+  has(with(&WalkFiles::experiment_toml, "\"compass\"", "\"biped\""), "none of \"compass\", \"simplest\"");
+  has(with(&WalkFiles::experiment_toml, "mean = 3", "mean = 50"), "slope_deg.mean: 50 is outside [0, 45)");
+  has(with(&WalkFiles::experiment_toml, "half_angle_rad =", "half_angle ="), "unknown key 'half_angle' in columns");
+  has(with(&WalkFiles::steps_csv, ",0.27", ",15.5"), "half_angle_rad: 15.5");
+  has(with(&WalkFiles::steps_csv, "1,2,2,", "1,3,2,"), "step: 3 is not due: step 2 of trial 1 is");
+  has(with(&WalkFiles::steps_csv, "1,2,2,", "1,2,3,"), "phase: 3 is outside 1..2");
+  has(with(&WalkFiles::steps_csv, "swing_rate_rad_s", "swing"), "swing");
+  has(with(&WalkFiles::trials_csv, "stopped", "halted"), "'halted' is none of failed, stopped, lost");
+  has(with(&WalkFiles::trials_csv, "\n6,", "\n7,"), "steps.csv has no trial 7");
+}
+
+TEST_F(WalkFolder, EffectsThatTheMachineLacksAreRefused) {
+  EXPECT_NE(message_of<std::invalid_argument>([] {
+              drawn({{"hip_dampng.damping", 0.1}});
+            }).find("did you mean"),
+            std::string::npos);
+  EXPECT_NE(message_of<std::invalid_argument>([] {
+              drawn({{"hip_damping.damping", 9}});
+            }).find("[0, 5]"),
+            std::string::npos);
+}
+
+// One leg has more mass: the diagnosis names it with its size.
+TEST_F(WalkFolder, OneHeavierLegIsNamed) {
+  write(drawn({{"leg_mass.mass_ratio", 1.08}}, 12));
+  DiagnosisOptions options;
+  options.catalogue = {"leg_mass", "impact_loss", "slope_deg_drift"};
+  const Diagnosis answer = diagnose_walks(*read_walks(folder_), options);
+  EXPECT_EQ(answer.verdict, Verdict::explained);
+  ASSERT_FALSE(answer.causes.ranked.empty());
+  EXPECT_EQ(answer.causes.ranked.front().name(), "leg_mass");
+}
+
+}  // namespace
+}  // namespace metastable::analysis::test
