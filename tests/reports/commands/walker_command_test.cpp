@@ -45,10 +45,17 @@ TEST_F(WalkerCommand, StepsSaysWhatStandsBehindThem) {
 TEST_F(WalkerCommand, SimulateWritesEveryStep) {
   const Ran ran = metastable(walker("simulate", {"--trials", "5", "--out", path("walks")}));
   ASSERT_EQ(ran.code, 0) << ran.err;
-  const std::string walks = read(path("walks/walks.csv")), trials = read(path("walks/trials.csv"));
-  EXPECT_NE(walks.find("trial,step,half angle [rad],"), std::string::npos) << walks.substr(0, 400);
+  const std::string steps = read(path("walks/steps.csv")), trials = read(path("walks/trials.csv"));
+  EXPECT_EQ(steps.find("trial,step,phase,half_angle_rad,stance_rate_rad_s\n"), 0u) << steps.substr(0, 400);
   EXPECT_NE(trials.find("5,"), std::string::npos);
   EXPECT_EQ(metastable(walker("simulate", {"--trials", "5", "--out", path("walks")})).code, 2);
+  const std::vector<std::string> facets{"--terrain", "facets", "--trials", "5", "--out", path("facets")};
+  ASSERT_EQ(metastable(walker("simulate", facets)).code, 0);
+  EXPECT_NE(read(path("facets/walks.csv")).find("trial,step,half angle [rad],"), std::string::npos);
+  const Ran wrong = metastable(walker("simulate", {"--effect", "leg_mass:mass_ratio=2", "--out", path("wrong")}));
+  EXPECT_EQ(wrong.code, 2);
+  EXPECT_NE(wrong.err.find("--effect: 'leg_mass.mass_ratio' is none of hip_damping.damping"), std::string::npos)
+      << wrong.err;
 }
 
 TEST_F(WalkerCommand, SweepIsTakenUpAgain) {
