@@ -21,6 +21,7 @@ using analysis::GapMap;
 
 constexpr double full_colour = 6;  // score beyond which colours do not change
 constexpr std::size_t bars_at_most = 8;
+constexpr std::size_t most_return_maps = 6;
 constexpr std::size_t furthest_rows = 8, least_rows = 3, most_rows = 14;  // of one figure
 // A place is shown alone where its score is beyond this: of some hundred that are chance, one in three maps has such
 // one.
@@ -111,6 +112,9 @@ Figure map_figure(const std::vector<Row>& rows, const std::vector<std::string>& 
   return figure;
 }
 
+// Says whether the answer is of speeds at collisions; else it is of the columns of a machine.
+bool of_speeds(const Diagnosis& d) { return d.data.step_name != "step"; }
+
 // Draws the places where one aspect tells most. @param first  its first column of the rows
 std::optional<Figure> furthest_figure(std::vector<Row> rows, const std::vector<ModelMap>& models, std::size_t first,
                                       const std::string& id, std::string title, std::size_t least) {
@@ -134,14 +138,72 @@ std::optional<Figure> furthest_figure(std::vector<Row> rows, const std::vector<M
 
 }  // namespace
 
+std::vector<Figure> closes_figures(const Diagnosis& d) {
+  BarChart bars{.name = {}, .value = {}};
+  const auto add = [&](const std::string& name, const std::optional<Estimate>& share, int colour) {
+    if (!share || bars.name.size() >= bars_at_most) return;
+    bars.name.push_back(name);
+    bars.value.push_back(100 * share->value);
+    bars.lower.push_back(100 * share->lower);
+    bars.upper.push_back(100 * share->upper);
+    bars.colour.push_back(colour);
+  };
+  for (const analysis::AtWork& one : d.causes.at_work) {
+    if (one.probability < worded_probability) continue;
+    add(one.name + ", alone", one.closes_alone, effect_colour);
+    add(one.name + ", last", one.closes_beside, recalibrated_colour);
+  }
+  if (bars.name.empty()) return {};
+  Figure figure{.id = "closes", .title = "What each effect closes", .x = {"share of the held-out gap", "%"}, .y = {""}};
+  figure.height = std::max(130 + 30 * static_cast<int>(bars.name.size()), shrinkage_height);
+  figure.bars = std::move(bars);
+  return {figure};
+}
+
+std::vector<Figure> return_map_figures(const Diagnosis& d) {
+  if (!d.model || of_speeds(d)) return {};
+  const auto simulated = d.model->simulate(analysis::nominal_values(*d.model), {}, 1);
+  const auto columns = d.model->columns();
+  std::vector<Figure> figures;
+  for (std::size_t c = 0; c < columns.size() && c < most_return_maps; ++c) {
+    Series drawn{.label = "simulated, as given", .style = Style::dots, .x = {}, .y = {}, .colour = given_colour};
+    Series measured{.label = "measured", .style = Style::dots, .x = {}, .y = {}, .colour = effect_colour};
+    const auto fill = [&](const analysis::TransitionModel& model, Series& series) {
+      const analysis::Event* before = nullptr;
+      for (const analysis::Event& event : model.events()) {
+        if (event.column != c || event.kind != analysis::EventKind::step) continue;
+        if (before && before->trial == event.trial && before->number + 1 == event.number) {
+          series.x.push_back(before->speed);
+          series.y.push_back(event.speed);
+        }
+        before = &event;
+      }
+    };
+    fill(*simulated, drawn);
+    fill(*d.model, measured);
+    if (measured.x.empty()) continue;
+    Figure figure{.id = fmt::format("return-map-{}", c + 1),
+                  .title = columns[c].name,
+                  .x = {"this step", columns[c].unit},
+                  .y = {"next step", columns[c].unit}};
+    for (Series* series : {&drawn, &measured})
+      if (!series->x.empty()) figure.series.push_back(std::move(*series));
+    figure.diagonal = Diagonal::yes;
+    figure.legend = Legend::below;
+    figures.push_back(std::move(figure));
+  }
+  return figures;
+}
+
 std::vector<Figure> furthest_figures(const Diagnosis& d) {
   std::vector<std::string> columns;
   const std::vector<Row> rows = rows_of(d, columns);
   const std::vector<ModelMap> models = models_of(d);
   std::vector<Figure> figures;
-  if (auto mean = furthest_figure(rows, models, 0, "map-furthest", "Mean speed", least_rows))
+  if (auto mean = furthest_figure(rows, models, 0, "map-furthest", of_speeds(d) ? "Mean speed" : "Mean", least_rows))
     figures.push_back(std::move(*mean));
-  if (auto spread = furthest_figure(rows, models, models.size(), "map-furthest-spread", "Spread of the speed", 0))
+  if (auto spread = furthest_figure(rows, models, models.size(), "map-furthest-spread",
+                                    of_speeds(d) ? "Spread of the speed" : "Spread", 0))
     figures.push_back(std::move(*spread));
   return figures;
 }
@@ -197,8 +259,8 @@ std::vector<Figure> profile_figures(const Diagnosis& d) {
       measured.x.push_back(x), measured.y.push_back(p.measured);
       measured.lower.push_back(p.measured - analysis::normal_95 * p.measured_error);
       measured.upper.push_back(p.measured + analysis::normal_95 * p.measured_error);
-      if (p.baseline > 0) given.x.push_back(x), given.y.push_back(p.baseline);
-      if (!(p.with_effect > 0)) continue;
+      if (std::isfinite(p.baseline)) given.x.push_back(x), given.y.push_back(p.baseline);
+      if (!std::isfinite(p.with_effect)) continue;
       effect.x.push_back(x), effect.y.push_back(p.with_effect);
       band.x.push_back(x);
       band.lower.push_back(p.with_effect - p.band), band.upper.push_back(p.with_effect + p.band);
@@ -206,8 +268,10 @@ std::vector<Figure> profile_figures(const Diagnosis& d) {
     if (measured.x.empty()) continue;
     Figure figure{.id = fmt::format("profile-{}", c + 1),
                   .title = d.data.condition_names[c],
-                  .x = {.label = "collision", .low = measured.x.front() - 0.5, .high = measured.x.back() + 0.5},
-                  .y = {"mean speed before it", "rad/s"}};
+                  .x = {.label = d.data.step_name, .low = measured.x.front() - 0.5, .high = measured.x.back() + 0.5},
+                  .y = of_speeds(d) ? FigureAxis{"mean speed before it", "rad/s"}
+                       : d.model    ? FigureAxis{"mean " + d.model->columns().front().name}
+                                    : FigureAxis{"mean"}};
     for (Series* series : {&band, &given, &effect, &measured})
       if (!series->x.empty()) figure.series.push_back(std::move(*series));
     figure.legend = Legend::below;

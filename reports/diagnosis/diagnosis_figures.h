@@ -14,6 +14,11 @@ std::vector<Figure> furthest_figures(const analysis::Diagnosis& diagnosis);
 /// Draws all the map's cells under the three models, coloured by their scores, some facets a figure, collisions and
 /// stances apart.
 std::vector<Figure> map_figures(const analysis::Diagnosis& diagnosis);
+/// Draws bars of the share of the held-out gap that each effect at work closes, alone and last.
+std::vector<Figure> closes_figures(const analysis::Diagnosis& diagnosis);
+/// Draws each column's next value against the one before, measured and simulated by the model as given; of machines,
+/// where the answer has its model.
+std::vector<Figure> return_map_figures(const analysis::Diagnosis& diagnosis);
 /// Draws the mean speed by collision, measured and simulated, a figure a condition.
 std::vector<Figure> profile_figures(const analysis::Diagnosis& diagnosis);
 /// Draws the causes by probability.

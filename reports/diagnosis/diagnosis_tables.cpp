@@ -86,8 +86,10 @@ std::vector<GapCell> beyond_chance(const analysis::GapMap& map) {
 }
 
 Table data_table(const Diagnosis& d) {
-  Table table{
-      .id = "data", .title = "Data", .notes = d.data.notes, .columns = {{"trials"}, {d.data.step_name + "s"}, {"transitions"}}};
+  Table table{.id = "data",
+              .title = "Data",
+              .notes = d.data.notes,
+              .columns = {{"trials"}, {d.data.step_name + "s"}, {"transitions"}}};
   table.rows.push_back({d.data.trials, d.data.collisions, d.data.events});
   return table;
 }
@@ -295,16 +297,19 @@ Table steps_table(const Diagnosis& d) {
 }
 
 Table profile_table(const Diagnosis& d) {
+  const bool speeds = d.data.step_name != "step";
+  const std::string unit = speeds ? "rad/s" : "";
   Table table{.id = "profile",
-              .title = "Mean speed before a collision, measured and simulated",
+              .title = speeds ? "Mean speed before a collision, measured and simulated"
+                              : "Mean of the first column by step, measured and simulated",
               .notes = {"Band: half-width of the 95 % band of the simulated mean of as many trials."},
               .columns = {{"condition"},
-                          {"collision"},
+                          {speeds ? "collision" : "step"},
                           {"trials"},
-                          {"measured", "rad/s", NumberFormat::significant, 4},
-                          {"as given", "rad/s", NumberFormat::significant, 4},
-                          {"with effect", "rad/s", NumberFormat::significant, 4},
-                          {"band", "rad/s"}}};
+                          {"measured", unit, NumberFormat::significant, 4},
+                          {"as given", unit, NumberFormat::significant, 4},
+                          {"with effect", unit, NumberFormat::significant, 4},
+                          {"band", unit}}};
   for (const analysis::ProfilePoint& p : d.shrinkage.profile) {
     const double half = analysis::normal_95 * p.measured_error;
     table.rows.push_back({d.data.condition_names.at(p.condition), p.collision, p.trials,

@@ -38,10 +38,10 @@ Table shrinkage_lines(const analysis::Diagnosis& d) {
   Table table{
       .id = "shrinkage",
       .title = "How far it shrinks",
-      .notes =
-          {fmt::format("Nats: natural logarithms of the likelihood. A model better by 0.1 nats a {0} makes each {0} "
-                       "exp(0.1) = 1.1 times as probable, a hundred of them 22,000 times.",
-                       d.data.step_name)},
+      .notes = {fmt::format(
+          "Nats: natural logarithms of the likelihood. A model better by 0.1 nats a {0} makes each {0} "
+          "exp(0.1) = 1.1 times as probable, a hundred of them 22,000 times.",
+          d.data.step_name)},
       .columns = {
           {"measure"}, {"unit"}, {"as given"}, {"recalibrated"}, {"with effect"}, {"floor"}, {"closed (90 %)"}}};
   const auto known = [](double value) { return std::isnan(value) ? Cell("") : Cell(value); };

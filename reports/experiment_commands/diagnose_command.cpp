@@ -74,6 +74,9 @@ void write_diagnosis(const analysis::Diagnosis& d, const std::string& title, con
     answer.push_back(std::move(shrinking.front()));
     shrinking.erase(shrinking.begin());
   }
+  for (Figure& figure : closes_figures(d)) answer.push_back(std::move(figure));
+  const bool speeds = d.data.step_name != "step";
+  const std::string values = speeds ? "speeds" : "values";
   sections.add(
       "which", "Which effect, and how much of the gap it closes",
       "How probable each cause is, given these data, and what is left of the gap on trials that the fit did not "
@@ -85,17 +88,21 @@ void write_diagnosis(const analysis::Diagnosis& d, const std::string& title, con
         {causes_table(d), parameters_table(d), undecided_table(d)}},
        {"Every measure of the gap", {}, std::move(shrinking), {shrinkage_table(d)}}});
   sections.add("where", "Where the gap lies",
-               "The places where the models are furthest from the measured speeds. Red, the measured speeds are higher "
-               "or more spread than the model’s; blue, lower or less. The score is standard normal without a gap: the "
-               "largest of so many places is about 3 by chance, and beyond 4 it is rarely chance.",
+               fmt::format("The places where the models are furthest from the measured {0}. Red, the measured {0} are "
+                           "higher or more spread than the model’s; blue, lower or less. The score is standard normal "
+                           "without a gap: the largest of so many places is about 3 by chance, and beyond 4 it is "
+                           "rarely chance.",
+                           values),
                furthest_figures(d), {},
                {{"Cells beyond chance, after recalibration", {}, {}, {where_table(d)}},
                 {"The whole map, in colours and in numbers", {}, map_figures(d), {map_table(d)}}});
   sections.add("how-far", "Steps before failure", "What the models say of the steps that were observed.", {},
                {steps_table(d)});
-  sections.add("profiles", "Speeds, measured and simulated",
+  sections.add("return-maps", "The return map, measured and simulated",
+               "Each dot is a step: a value, and the one a step later.", return_map_figures(d), {});
+  sections.add("profiles", speeds ? "Speeds, measured and simulated" : "Step by step, measured and simulated",
                "Bars are 95 % intervals of the measured means; the band holds the mean of as many simulated trials.",
-               profile_figures(d), {}, {{"The speeds in numbers", {}, {}, {profile_table(d)}}});
+               profile_figures(d), {}, {{speeds ? "The speeds in numbers" : "In numbers", {}, {}, {profile_table(d)}}});
   sections.add("next", "The next experiment", "Changes of the experiment that tell the remaining causes apart best.",
                {}, {next_table(d)});
   sections.add("details", "Details", "What stands behind the verdict, and what these data could not see.", {}, {},
