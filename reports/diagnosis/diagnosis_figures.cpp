@@ -36,7 +36,10 @@ constexpr std::string_view stance_mark = ", stance", collision_mark = ", collisi
 std::string row_name(const GapCell& cell) {
   std::string name = cell.at;
   for (const std::string_view mark : {stance_mark, collision_mark, since_mark})
-    if (const std::size_t at = name.rfind(mark); at != std::string::npos) name.erase(at, mark.size());
+    if (const std::size_t at = name.rfind(mark); at != std::string::npos) {
+      const std::size_t end = at + mark.size();  // a column's name may begin with the word
+      if (end == name.size() || name[end] == ' ' || name[end] == ',') name.erase(at, mark.size());
+    }
   if (cell.swing) return "largest swing with the time";
   return cell.facet == "phase" ? "all" : name;
 }
