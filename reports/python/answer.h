@@ -55,8 +55,13 @@ inline std::string tables_html(const std::vector<Table>& tables) {
   return html;
 }
 
-/// Gives a diagnosis as `diagnose --json` and its text.
-py::dict diagnosis_answer(const analysis::Diagnosis& found, const Provenance& provenance);
+/// Returns gnuplot's scripts of the figures that a notebook shows of a diagnosis. It simulates the diagnosed machine
+/// once.
+std::vector<std::string> notebook_figures(const analysis::Diagnosis& found);
+
+/// Gives a diagnosis as `diagnose --json`, its text, and its figures.
+py::dict diagnosis_answer(const analysis::Diagnosis& found, const Provenance& provenance,
+                          const std::vector<std::string>& figures);
 
 /// Tells a call of the parts of a command.
 inline BeginPart parts_of(Call& call) {

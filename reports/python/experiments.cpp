@@ -13,6 +13,7 @@
 #include "analysis/experiment/experiment.h"
 #include "analysis/experiment_model/diagnose.h"
 #include "reports/command_line/requests.h"
+#include "reports/diagnosis/diagnosis_figures.h"
 #include "reports/diagnosis/diagnosis_json.h"
 #include "reports/diagnosis/diagnosis_tables.h"
 #include "reports/diagnosis/diagnosis_text.h"
@@ -182,9 +183,13 @@ py::dict diagnose(const HeldExperiment& held, const py::dict& options, const std
   analysis::Diagnosis found;
   Call call(progress);
   study.progress = [&](double share, const std::string& doing) { call.tell(share, doing); };
-  call.run([&] { found = analysis::diagnose(held->experiment, study); });
+  std::vector<std::string> figures;
+  call.run([&] {
+    found = analysis::diagnose(held->experiment, study);
+    figures = notebook_figures(found);
+  });
   const Provenance provenance{command, "experiment: " + held->experiment.title, study.seed, version()};
-  return diagnosis_answer(found, provenance);
+  return diagnosis_answer(found, provenance, figures);
 }
 
 py::dict describe(const HeldExperiment& held, const py::dict& options, const std::string& command,
@@ -211,12 +216,24 @@ py::dict describe(const HeldExperiment& held, const py::dict& options, const std
 
 }  // namespace
 
-py::dict diagnosis_answer(const analysis::Diagnosis& found, const Provenance& provenance) {
+std::vector<std::string> notebook_figures(const analysis::Diagnosis& found) {
+  std::vector<std::string> scripts;
+  for (const auto& figures : {ranking_figures(found), closes_figures(found), furthest_figures(found),
+                              return_map_figures(found), profile_figures(found)})
+    for (const Figure& figure : figures) scripts.push_back(gnuplot_script(figure));
+  return scripts;
+}
+
+py::dict diagnosis_answer(const analysis::Diagnosis& found, const Provenance& provenance,
+                          const std::vector<std::string>& figures) {
   std::vector<Table> tables{gap_table(found),    contact_table(found),   where_table(found), at_work_table(found),
                             causes_table(found), shrinkage_table(found), steps_table(found), visibility_table(found)};
   std::erase_if(tables, [](const Table& table) { return table.rows.empty(); });
-  return answer(diagnosis_json(found, provenance), diagnosis_text(found, line_width),
-                "<p>" + escape_html(fmt::format("{}", fmt::join(found.sentences, " "))) + "</p>" + tables_html(tables));
+  py::dict given =
+      answer(diagnosis_json(found, provenance), diagnosis_text(found, line_width),
+             "<p>" + escape_html(fmt::format("{}", fmt::join(found.sentences, " "))) + "</p>" + tables_html(tables));
+  given["figures"] = figures;
+  return given;
 }
 
 void add_experiments(py::module_& module) {

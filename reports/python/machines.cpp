@@ -140,6 +140,7 @@ py::dict diagnose_machine(const py::dict& machine_fields, const py::dict& runs_f
   analysis::MachineRuns runs = runs_of(runs_fields);
   analysis::Diagnosis found;
   Call call(progress);
+  std::vector<std::string> figures;
   const std::vector<std::string> names = machine->value_names();
   machine->step = [&](const analysis::MachineBatch& batch) {
     if (batch.rows > 0) call.ask([&] { ask_step(step, names, batch); });
@@ -152,9 +153,10 @@ py::dict diagnose_machine(const py::dict& machine_fields, const py::dict& runs_f
       for (const auto id : std::views::split(entry, '+'))
         analysis::require_word("catalogue", std::string_view(id.begin(), id.end()), known);
     found = analysis::diagnose(std::move(model), study);
+    figures = notebook_figures(found);
   });
   found.model.reset();  // its map asks through this call
-  return diagnosis_answer(found, {command, "machine: " + machine->name, study.seed, version()});
+  return diagnosis_answer(found, {command, "machine: " + machine->name, study.seed, version()}, figures);
 }
 
 // Returns nothing for a folder that holds no walks.
@@ -171,8 +173,12 @@ py::object diagnose_walks(const std::string& folder, const py::dict& options, co
   study.catalogue = given.texts("catalogue");
   study.progress = [&](double share, const std::string& doing) { call.tell(share, doing); };
   analysis::Diagnosis found;
-  call.run([&] { found = analysis::diagnose_walks(*walks, study); });
-  return diagnosis_answer(found, {command, "experiment: " + walks->title, study.seed, version()});
+  std::vector<std::string> figures;
+  call.run([&] {
+    found = analysis::diagnose_walks(*walks, study);
+    figures = notebook_figures(found);
+  });
+  return diagnosis_answer(found, {command, "experiment: " + walks->title, study.seed, version()}, figures);
 }
 
 }  // namespace

@@ -3,6 +3,7 @@
 import importlib
 import math
 import numbers
+import subprocess
 
 import numpy
 
@@ -112,3 +113,12 @@ def plot_walked(ax, steps, failed):
     ax.step(n, share, where="post")
     ax.set(xlabel="steps n", ylabel="share of walks with more than n steps", ylim=(0, 1.02))
     return ax
+
+
+def drawn(script):
+    """What gnuplot draws of a script, as SVG for a notebook; nothing where gnuplot is not installed or fails."""
+    try:
+        ran = subprocess.run(["gnuplot"], input=script, capture_output=True, text=True, timeout=30, check=True)
+    except (OSError, subprocess.SubprocessError):
+        return ""
+    return ran.stdout[max(ran.stdout.find("<svg"), 0):]

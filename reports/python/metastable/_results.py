@@ -299,7 +299,15 @@ class WalkerComparison(Result):
 
 
 class Diagnosis(Result):
-    """What an experiment's nominal model lacks. Fields: `diagnose --json` of reports/README.md. Its rows are its causes."""
+    """What an experiment's nominal model lacks. Fields: `diagnose --json` of reports/README.md. Its rows are its causes.
+    A notebook shows its tables and, where gnuplot is installed, its figures."""
+
+    def __init__(self, answer):
+        super().__init__(answer)
+        self._scripts = list(answer["figures"])
+
+    def _repr_html_(self):
+        return self._html + "".join(_frames.drawn(script) for script in self._scripts)
 
     def _headline(self):
         return f"{self.verdict}: {self.sentences[0]}"
