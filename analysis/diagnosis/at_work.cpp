@@ -19,10 +19,11 @@ bool holds(const Cause& cause, const std::string& effect) {
   return std::ranges::find(cause.effects, effect) != cause.effects.end();
 }
 
-// Averages an effect's parameters over the hypotheses that hold it: their intervals are those of a mixture of normals.
+// Averages an effect's parameters over the hypotheses that hold it: their intervals are those of a mixture of normals,
+// each as wide on either side of its middle as its own interval.
 std::vector<EstimatedParameter> averaged(const std::vector<Cause>& ranked, const std::string& effect) {
   std::vector<EstimatedParameter> mean;
-  std::vector<double> variance;
+  std::vector<double> below, above;  // means of squares
   double weights = 0;
   for (const Cause& cause : ranked) {
     const auto at = std::ranges::find(cause.effects, effect);
@@ -31,7 +32,8 @@ std::vector<EstimatedParameter> averaged(const std::vector<Cause>& ranked, const
     if (mean.empty()) {
       mean = own;
       for (EstimatedParameter& p : mean) p.value = 0;
-      variance.assign(own.size(), 0);
+      below.assign(own.size(), 0);
+      above = below;
     }
     const auto same_variant = [&] {
       if (own.size() != mean.size()) return false;
@@ -42,18 +44,22 @@ std::vector<EstimatedParameter> averaged(const std::vector<Cause>& ranked, const
     if (own.empty() || !same_variant()) continue;
     weights += cause.probability;
     for (std::size_t k = 0; k < own.size(); ++k) {
-      const double sd = (own[k].upper - own[k].lower) / (2 * normal_90);
-      mean[k].value += cause.probability * own[k].value;
-      variance[k] += cause.probability * (sd * sd + own[k].value * own[k].value);
+      const double value = own[k].value, down = (value - own[k].lower) / normal_90,
+                   up = (own[k].upper - value) / normal_90;
+      mean[k].value += cause.probability * value;
+      below[k] += cause.probability * (down * down + value * value);
+      above[k] += cause.probability * (up * up + value * value);
     }
   }
   for (std::size_t k = 0; k < mean.size(); ++k) {
     EstimatedParameter& p = mean[k];
     if (weights > 0) p.value /= weights;
     if (!p.fitted) continue;
-    const double half = normal_90 * std::sqrt(std::max(0.0, variance[k] / weights - p.value * p.value));
-    p.lower = p.value - half;
-    p.upper = p.value + half;
+    const auto half = [&](double squares) {
+      return normal_90 * std::sqrt(std::max(0.0, squares / weights - p.value * p.value));
+    };
+    p.lower = p.value - half(below[k]);
+    p.upper = p.value + half(above[k]);
   }
   return mean;
 }
