@@ -184,7 +184,7 @@ BlindKind blind_kind(std::string_view name) {
 }
 
 bool can_be_had(std::string_view effect, dynamics::Law law) {
-  if (law != dynamics::Law::settled) return true;
+  if (law != dynamics::Law::settled) return effect != "soft_contact";
   for (const std::string_view lacking :
        {"bounce", "ramp_vibration", "slip_reversal", "inertia", "stored_energy", "sloshing_fluid"})
     if (effect == lacking) return false;
@@ -208,17 +208,21 @@ std::vector<BlindPlan> blind_plan(const BlindSize& size, std::uint64_t seed) {
   BlindDice dice(seed, 0);
   std::vector<BlindPlan> plan;
   std::map<BlindKind, std::size_t> turn;
+  const auto had = [](const BlindPlan& one, dynamics::Law law) {
+    return (one.outside.empty() || can_be_had(one.outside, law)) &&
+           std::ranges::all_of(one.effects, [&](const std::string& id) { return can_be_had(id, law); });
+  };
+  const auto law_of = [&](const BlindPlan& one) {
+    return std::ranges::find_if(size.laws, [&](dynamics::Law law) { return had(one, law); });
+  };
   const auto add = [&](BlindPlan one) {
-    const auto had = [&](dynamics::Law law) {
-      return (one.outside.empty() || can_be_had(one.outside, law)) &&
-             std::ranges::all_of(one.effects, [&](const std::string& id) { return can_be_had(id, law); });
-    };
     one.law = size.laws[turn[one.kind] % size.laws.size()];
-    if (!had(one.law)) {
-      if (std::ranges::find(size.laws, dynamics::Law::published) == size.laws.end()) return;
-      one.law = dynamics::Law::published;
-    } else {
+    if (had(one, one.law)) {
       ++turn[one.kind];
+    } else {
+      const auto other = law_of(one);
+      if (other == size.laws.end()) return;
+      one.law = *other;
     }
     plan.push_back(std::move(one));
   };
@@ -230,22 +234,28 @@ std::vector<BlindPlan> blind_plan(const BlindSize& size, std::uint64_t seed) {
     if (info.id == recalibration) continue;
     for (int n = 0; n < size.left_out_per_effect; ++n) add({BlindKind::left_out, {info.id}, 2});
     // An effect without a size is there or not: it cannot be made as visible as another one beside it.
-    if (!info.parameters.empty()) paired.push_back(info.id);
+    if (!info.parameters.empty() && law_of({BlindKind::pair, {info.id}, 2}) != size.laws.end())
+      paired.push_back(info.id);
   }
-  const auto several = [&](std::size_t count) {
-    std::vector<std::string> drawn;
-    while (drawn.size() < count) {
+  // Draws effects that one law has together.
+  const auto several = [&](std::size_t count, const std::string& beside = "") {
+    BlindPlan one{BlindKind::pair, {}, 2, {}, beside};
+    if (law_of(one) == size.laws.end()) one.outside.clear();  // no law has it: there will be no case
+    while (one.effects.size() < count) {
       const std::string& id = paired[static_cast<std::size_t>(dice.whole(0, static_cast<int>(paired.size()) - 1))];
-      if (std::ranges::find(drawn, id) == drawn.end()) drawn.push_back(id);
+      if (std::ranges::find(one.effects, id) != one.effects.end()) continue;
+      one.effects.push_back(id);
+      if (law_of(one) == size.laws.end()) one.effects.pop_back();
     }
-    return drawn;
+    return one.effects;
   };
   for (int p = 0; p < size.pairs; ++p) add({BlindKind::pair, several(2), 2});
   const auto& outside = dynamics::outside_effects();
   const auto family = [&](int n) { return outside[static_cast<std::size_t>(n) % outside.size()].id; };
   for (int o = 0; o < size.outside; ++o)
     add({BlindKind::outside, {}, static_cast<std::size_t>(o) / outside.size() % 2 == 0 ? 2 : 4, {}, family(o)});
-  for (int m = 0; m < size.mixed; ++m) add({BlindKind::mixed, several(m % 2 == 0 ? 1 : 2), 2, {}, family(m)});
+  for (int m = 0; m < size.mixed; ++m)
+    add({BlindKind::mixed, several(m % 2 == 0 ? 1 : 2, family(m)), 2, {}, family(m)});
   for (int m = 0; m < size.many; ++m) add({BlindKind::many, several(3), 2});
   for (std::size_t i = plan.size(); i > 1; --i)
     std::swap(plan[i - 1], plan[static_cast<std::size_t>(dice.whole(0, static_cast<int>(i) - 1))]);

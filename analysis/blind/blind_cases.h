@@ -34,14 +34,14 @@ struct BlindSize {
   int outside = 50;
   int left_out_per_effect = 3;
   /// Laws that the cases of every kind obey in turn: published, or settled (by the laboratory's rigid body). Effects
-  /// that no rigid body has (can_be_had()) stay with published; without it among the laws they have no case.
+  /// that one law lacks (can_be_had()) stay with the other; without that among the laws they have no case.
   std::vector<dynamics::Law> laws = {dynamics::Law::published};
   int mixed = 0;
   int many = 0;
 };
 /// Says whether the laboratory has cases of an effect, of the catalogue or outside, under a law. Under settled it has
 /// none of what acts on the loss of a collision, of slip_reversal, sloshing_fluid, and of inertia, which is
-/// recalibrated.
+/// recalibrated; under the other laws none of soft_contact.
 bool can_be_had(std::string_view effect, dynamics::Law law);
 
 /// Holds what is true of a case, sealed until it is answered.

@@ -124,6 +124,11 @@ SizedEffect contact_outliers(const Draw& d) {
   });
 }
 
+// The size is what an impact lasts in proportion to.
+SizedEffect soft_contact(const Draw& d) {
+  return sized(d, 1e-4, 3e-3, [](double s) { return Values{{"compliance_m_n", {s * s}}}; });
+}
+
 SizedEffect ramp_vibration(const Draw& d) {
   const double frequency = d.dice.uniform(4, 40);
   return sized(d, 0.02, 0.6,
@@ -172,6 +177,7 @@ const std::map<std::string, Entry>& all() {
       {"sensor_bias",
        {[](const D& d) { return either_sign(d, "bias_rad_s", 0.005, 0.3, {"omega_plus_rad_s"}); }, {"phase", ":mean"}}},
       {"bounce", {bounce, {"phase", "speed", "condition"}}},
+      {"soft_contact", {soft_contact, {"speed", "phase", "condition"}}},
       {"ramp_vibration", {ramp_vibration, {"time", "speed", "phase", ":spread"}}},
       {"slip_reversal",
        {[](const D& d) { return sized(d, 1, 1, [](double) { return Values{}; }); },

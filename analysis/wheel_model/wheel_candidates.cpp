@@ -318,6 +318,20 @@ WheelCandidate bounce(const WheelDesign& design) {
   return c;
 }
 
+// The root of the compliance is fitted: an impact lasts in proportion to it.
+WheelCandidate soft_contact(const WheelDesign& design) {
+  WheelCandidate c = simple("soft_contact", "", in(&Extension::contact, &Extension::ContactChange::softness),
+                            {0, 0, std::sqrt(1e-5), 1e-5, 3e-4});
+  c.candidate.report = [](const Values&, const Values& v) {
+    constexpr double least = 1e-12;  // [m/N]: as good as rigid
+    return std::vector<NamedValue>{{"compliance_m_n", v[0] * v[0]},
+                                   {"stiffness_n_m", 1 / std::max(least, v[0] * v[0])}};
+  };
+  c.candidate.form_of = [](const Values& v) { return FittedForm{{}, {std::sqrt(v[0])}}; };
+  if (design.law != dynamics::Law::settled) c.candidate.undecidable = "no impact lasts but under `settled`";
+  return c;
+}
+
 WheelCandidate slip_reversal(const WheelDesign& design) {
   WheelCandidate c;
   c.candidate.id = "slip_reversal";
@@ -372,6 +386,7 @@ std::vector<WheelCandidate> wheel_candidates(const WheelDesign& design) {
       sensor_noise(design),
       sensor_bias(design),
       bounce(design),
+      soft_contact(design),
       needing(2, design.successive, after_another, ramp_vibration()),
       slip_reversal(design),
   };

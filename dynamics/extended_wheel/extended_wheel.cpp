@@ -39,6 +39,7 @@ ExtendedWheel::ExtendedWheel(const Wheel& stated, double slope, Law law, const C
   drag_ = torques.viscous != 0 || torques.rolling != 0 || torques.air != 0;
   profile_ = extension.geometry.sag != 0;
   if (!settles()) return;
+  if (extension.contact.softness > 0) soft_.emplace(extension.contact.softness, contact.restitution_mean);
   hold_against_stated(ExtendedWheel(stated, slope, law, contact, Extension{}));
   read_landings_at_own_inertia();
 }
@@ -329,6 +330,7 @@ SettledLanding ExtendedWheel::landing(const StepContext& context, double omega) 
     const double bend = (last - 2 * middle + first) / (2 * half * half), rise = (middle - first) / half - bend * half;
     at.dragged = {first - low * (rise - low * bend), rise - 2 * low * bend, bend};
   }
+  if (soft_) soft_->soften(at, {model_.mass, model_.gravity, c.slope_rad});
   return at;
 }
 

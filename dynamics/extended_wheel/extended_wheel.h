@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "dynamics/settled/settled_density.h"
+#include "dynamics/settled/soft_contact.h"
 #include "dynamics/step_density/collision_density.h"
 #include "dynamics/wheel/wheel.h"
 
@@ -48,6 +49,7 @@ struct Extension {
     double memory = 0;                             ///< correlation of successive collisions of a trial
     double outlier_share = 0;                      ///< probability of a collision with outlier_friction
     double outlier_friction = 1;                   ///< ratio of its mu
+    double softness = 0;                           ///< of tips, 1 / sqrt(stiffness) [(m/N)^(1/2)]; `settled`
     double rebound_lost = 0;                       ///< share
     double hops_from = 0;                          ///< omega- from which on it is lost [rad/s]
     double ring_cosine = 0, ring_sine = 0;         ///< loss times 1 + cosine cos(2 pi f dt) + sine sin(2 pi f dt)
@@ -170,6 +172,7 @@ class ExtendedWheel {
   ContactSpread contact_;
   std::optional<CollisionDensity> density_;  // none under `plastic`, of which every collision is certain
   std::shared_ptr<const LandingShares> landings_;
+  std::optional<SoftContact> soft_;
   double tip_radius_ = 0;
   std::vector<Leg> geometry_;
   bool drag_ = false, profile_ = false;

@@ -101,7 +101,11 @@ Laboratory::Laboratory(LaboratorySetup setup)
       restitution_(changes_.stated.restitution_mean, changes_.stated.restitution_sd, 0, 1),
       friction_(changes_.stated.friction_mean, changes_.stated.friction_sd, 0) {
   wheel_.validate();
-  if (setup_.law == Law::settled) require_rigid(setup_, changes_);
+  if (setup_.law == Law::settled)
+    require_rigid(setup_, changes_);
+  else if (changes_.compliance > 0)
+    throw std::invalid_argument(
+        fmt::format("laboratory: effect soft_contact needs impacts that last; law {} has none", law_name(setup_.law)));
   model_ = contact_model(wheel_, law_);
   if (law_ == Law::settled) require(rigid_inertia() > 0, "inertia about the hub", rigid_inertia(), "(0, inf) kg m^2");
   require(std::abs(setup_.restitution_skewness) < 2, "restitution_skewness", setup_.restitution_skewness, "(-2, 2)");
@@ -206,7 +210,8 @@ class Laboratory::Roll {
   // The trial in the second laboratory.
   LaboratoryTrial run_rigid(const LaboratoryCondition& condition) {
     const double inertia = lab_.rigid_inertia();
-    RigidRoll roll(body_, surface_, inertia, condition.first_landing_leg, launch_);
+    RigidRoll roll(body_, surface_, inertia, condition.first_landing_leg, launch_,
+                   c_.compliance > 0 ? 1 / c_.compliance : 0);
     for (;;) {
       LaboratoryCollision& collision = add_collision(roll.leg(), roll.position(), roll.spin(), roll.time());
       collision.flew = !roll.on_ground();

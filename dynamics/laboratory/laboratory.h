@@ -70,7 +70,7 @@ class Laboratory {
  public:
   /// @throws std::invalid_argument naming what is out of range (setup, effect, or a condition by its index), and under
   ///         `settled` round tips and effects on what a collision loses (bounce, ramp_vibration, stored_energy),
-  ///         slip_reversal, sloshing_fluid: a rigid body has none of these
+  ///         slip_reversal, sloshing_fluid: a rigid body has none of these; under the other laws soft_contact
   explicit Laboratory(LaboratorySetup setup);
 
   const LaboratorySetup& setup() const { return setup_; }

@@ -53,6 +53,7 @@ const std::map<std::string, Change, std::less<>>& changes() {
       {"sensor_noise", {[](C& c, Values v) { c.sensor_noise = v[0]; }}},
       {"sensor_bias", {[](C& c, Values v) { c.sensor_bias = v[0]; }}},
       {"bounce", {[](C& c, Values v) { c.rebound_lost = v[0], c.hops_from = v[1]; }}},
+      {"soft_contact", {[](C& c, Values v) { c.compliance = v[0]; }}},
       {"ramp_vibration", {[](C& c, Values v) { c.vibration = v[0], c.vibration_hz = v[1]; }}},
       {"slip_reversal", {[](C& c, Values) { c.slip_reversal = true; }}},
   };

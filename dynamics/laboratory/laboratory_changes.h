@@ -36,7 +36,8 @@ struct LaboratoryChanges {
   double outlier_share = 0, outlier_ratio = 1;
   double sensor_noise = 0, sensor_bias = 0;
   double rebound_lost = 0;
-  double hops_from = 0;  // omega- [rad/s]
+  double hops_from = 0;   // omega- [rad/s]
+  double compliance = 0;  // of tips [m/N]
   double vibration = 0, vibration_hz = 10;
   bool slip_reversal = false;
   // These are outside the catalogue.

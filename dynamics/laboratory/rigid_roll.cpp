@@ -15,16 +15,53 @@ constexpr double closed_gap = 1e-9;    // [m]
 constexpr double spent_energy = 1e-3;  // [J] of motion; before the barrier such a wheel rests
 constexpr double before_top = 0.02;    // [rad]
 constexpr int spring_steps = 500;      // of a quarter period
+constexpr int soft_steps = 200;        // of a soft tip's period over 2 pi
+constexpr int soft_rest = 8;           // such times, in which a foot leaves or has come to rest
+// A soft tip that touches slower than this many times the speed that its weight gives it in such a time would not leave
+// the ground again; it is struck as a rigid one.
+constexpr double soft_above = 5;
+constexpr double least_bounce = 0.01;  // of soft tips
 constexpr int most_events = 1000;      // of a landing; two feet that chatter longer rest
 constexpr int most_steps = 200000;
 
 double dot_of(const Point& a, const Point& b) { return a.x * b.x + a.z * b.z; }
 int sign_of(double value) { return value > 0 ? 1 : value < 0 ? -1 : 0; }
 
+// Returns the share of its speed that a mass keeps which strikes a spring with a damper of that ratio of the critical
+// one, followed in time with the period taken as 2 pi until the force would pull.
+double given_back(double damping) {
+  constexpr double step = 1.0 / soft_steps;
+  double depth = 0, speed = 1;
+  for (int n = 0; n < 10 * soft_steps; ++n) {
+    depth += speed * step / 2;
+    // The damper acts on the mean of the speeds before and after.
+    const double next = (speed * (1 - damping * step) - depth * step) / (1 + damping * step);
+    if (next >= speed) break;
+    speed = next;
+    depth += speed * step / 2;
+  }
+  return -speed;
+}
+
+double damping_of(double restitution) {
+  double low = 0, high = 20;
+  for (int i = 0; i < 40; ++i) {
+    const double damping = (low + high) / 2;
+    (given_back(damping) > restitution ? low : high) = damping;
+  }
+  return low;
+}
+
 }  // namespace
 
-RigidRoll::RigidRoll(const RollingBody& body, const RampSurface& surface, double inertia, int leg, double speed)
-    : body_(body), surface_(surface), inertia_(inertia), start_turn_(0), leg_(leg + body.legs()) {
+RigidRoll::RigidRoll(const RollingBody& body, const RampSurface& surface, double inertia, int leg, double speed,
+                     double stiffness)
+    : body_(body),
+      surface_(surface),
+      inertia_(inertia),
+      stiffness_(stiffness),
+      start_turn_(0),
+      leg_(leg + body.legs()) {
   const Pose pose = landing_pose(body, surface, leg, 0, speed);
   const Point centre = centre_of_mass(body, pose);
   const int behind = leg_ - 1;
@@ -173,8 +210,12 @@ double RigidRoll::value(const State& s, Event event, int foot) const {
   return foothold(feet_[k].leg).contact.friction * c.normal[k] - std::abs(c.tangential[k]);
 }
 
+void RigidRoll::note() {
+  if (moments_) moments_->push_back({time_, state_[2] - start_turn_, state_[5]});
+}
+
 // Goes to the next event. `foot`: the leg that touches, or the place in feet_ of the foot that it is about.
-RigidRoll::Event RigidRoll::run(std::vector<Moment>* moments, int& foot) {
+RigidRoll::Event RigidRoll::run(int& foot) {
   std::vector<std::pair<Event, int>> watched;
   for (const int leg : {leg_ - 1, leg_, leg_ + 1})
     if (!down(leg)) watched.emplace_back(Event::touches, leg);
@@ -213,7 +254,7 @@ RigidRoll::Event RigidRoll::run(std::vector<Moment>* moments, int& foot) {
     }
     state_ = event == Event::none ? to : moved(from, first);
     time_ += event == Event::none ? length : first;
-    if (moments) moments->push_back({time_, state_[2] - start_turn_, state_[5]});
+    note();
     if (event != Event::none) return event;
   }
   return Event::turns_back;  // it balances on one leg
@@ -236,6 +277,10 @@ void RigidRoll::strike(int leg) {
                tt = 1 / body_.mass + along_turn * along_turn / inertia_, nt = normal_turn * along_turn / inertia_;
   const double eta = f.contact.restitution, mu = f.contact.friction;
   double out = lift(state_, leg), along = slip(state_, leg);
+  if (stiffness_ > 0 && -out > soft_above * body_.gravity / std::sqrt(nn * stiffness_)) {
+    press(leg);
+    return;
+  }
   out = std::min(out, -1e-6 * std::abs(along));  // a foot that jams is not moving in yet
   double depth = 0, deepest = 0, normal = 0, tangential = 0;
   bool gives_back = false;
@@ -265,6 +310,43 @@ void RigidRoll::strike(int leg) {
     }
   }
   push(leg, normal, tangential);
+}
+
+// The foot presses the spring and damper of its tip, and the wheel moves on under its weight, until the foot is out of
+// the ground or has come to stay there.
+void RigidRoll::press(int leg) {
+  Foothold& f = foothold(leg);
+  const double mu = f.contact.friction, ground = std::min(0.0, gap(state_, leg));
+  double mass = 0, step = 0, damper = 0;
+  const auto drift = [&](double time) {
+    for (std::size_t i = 0; i < 3; ++i) state_[i] += time * state_[i + 3];
+    time_ += time;
+  };
+  for (int n = 0; n < soft_rest * soft_steps; ++n) {
+    drift(step / 2);
+    const double normal_turn = turn_of(state_, leg, f.up), along_turn = turn_of(state_, leg, f.along);
+    const double nn = 1 / body_.mass + normal_turn * normal_turn / inertia_,
+                 tt = 1 / body_.mass + along_turn * along_turn / inertia_, nt = normal_turn * along_turn / inertia_;
+    if (n == 0) {  // the mass that the tip meets is the one it strikes first
+      mass = 1 / std::max(nn / 100, nn + nt * std::clamp(-nt / tt, -mu, mu));
+      const double unit = std::sqrt(mass / stiffness_);
+      step = unit / soft_steps;
+      damper = 2 * f.damping * stiffness_ * unit;
+      drift(step / 2);
+    }
+    const double depth = ground - gap(state_, leg);
+    if (depth <= 0 && n > 0) break;
+    // The damper acts on the mean of the speeds before and after.
+    const double force = (stiffness_ * depth - damper * lift(state_, leg)) / (1 + damper * step / (2 * mass));
+    const double p = std::max(0.0, force) * step;
+    state_[3] += body_.gravity * std::sin(body_.slope_rad) * step;
+    state_[4] -= body_.gravity * std::cos(body_.slope_rad) * step;
+    state_[5] -= drag(state_[5]) / inertia_ * step;
+    push(leg, p, std::clamp(-(slip(state_, leg) + nt * p) / tt, -mu * p, mu * p));
+    drift(step / 2);
+  }
+  if (gap(state_, leg) <= 0) f.at = tip_at(state_, leg);
+  note();
 }
 
 // Strikes closed feet in turn until none approaches; those that do not leave are down.
@@ -330,10 +412,12 @@ bool RigidRoll::spent() const {
 }
 
 bool RigidRoll::step(const Contact& contact, std::vector<Moment>* moments) {
+  moments_ = moments;
+  const double damping = stiffness_ > 0 ? damping_of(std::max(least_bounce, contact.restitution)) : 0;
   const auto put = [&](int leg) {
     const Point at = tip_at(state_, leg);
     const double rise = surface_.rise(at.x);
-    foothold(leg) = {at, {std::cos(rise), std::sin(rise)}, {-std::sin(rise), std::cos(rise)}, contact};
+    foothold(leg) = {at, {std::cos(rise), std::sin(rise)}, {-std::sin(rise), std::cos(rise)}, contact, damping};
   };
   if (first_) put(leg_ - 1);
   first_ = false;
@@ -347,7 +431,7 @@ bool RigidRoll::step(const Contact& contact, std::vector<Moment>* moments) {
   for (int n = 0; n < most_events; ++n) {
     if (spent()) return false;
     int foot = 0;
-    const Event event = run(moments, foot);
+    const Event event = run(foot);
     if (event == Event::turns_back) return false;
     if (event == Event::touches && foot == leg_ + 1) {
       ++leg_;

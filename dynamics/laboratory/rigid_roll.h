@@ -4,7 +4,8 @@
 // Shares no formula with settled/: the mass centre and the turn are integrated by Runge-Kutta steps of fixed length,
 // contact forces come from a linear system of the tips' accelerations, and an impact is followed in time as a stiff
 // spring that gives back eta^2 of the energy it took (Walton and Braun 1986), with Coulomb friction beside it. Slip
-// stop, stick, reversal and jam are not told apart there: they follow.
+// stop, stick, reversal and jam are not told apart there: they follow. Tips of finite stiffness press a spring and a
+// damper while all the wheel goes on moving.
 
 #include <array>
 #include <vector>
@@ -19,7 +20,9 @@ class RigidRoll {
   /// Starts where `leg` touches, its tip at 0 m, as the wheel turns about the standing foot behind it.
   /// @param body, surface must outlive the roll; the fluid and `flight` of the body are left out
   /// @param inertia about the mass centre [kg m^2], > 0; @param speed > 0 [rad/s]
-  RigidRoll(const RollingBody& body, const RampSurface& surface, double inertia, int leg, double speed);
+  /// @param stiffness of the tips along the normal [N/m]; 0: rigid
+  RigidRoll(const RollingBody& body, const RampSurface& surface, double inertia, int leg, double speed,
+            double stiffness = 0);
 
   int leg() const { return leg_ % body_.legs(); }    ///< that touches
   double position() const;                           ///< of its tip, down the plane [m]
@@ -38,6 +41,7 @@ class RigidRoll {
   struct Foothold {
     Point at, along, up;
     Contact contact;
+    double damping = 0;  // of a soft tip, ratio of the critical one
   };
   struct Foot {  // on the ground
     int leg = 0;
@@ -65,16 +69,19 @@ class RigidRoll {
   State moved(const State& from, double time) const;
   double step_length() const;
   double value(const State& s, Event event, int foot) const;
-  Event run(std::vector<Moment>* moments, int& foot);
+  Event run(int& foot);
+  void note();
   void push(int leg, double normal, double tangential);
   void strike(int leg);
+  void press(int leg);
   void resolve(std::vector<int> closed);
   void choose_modes();
   bool spent() const;
 
   const RollingBody& body_;
   const RampSurface& surface_;
-  double inertia_, start_turn_, time_ = 0, after_ = 0;
+  double inertia_, stiffness_, start_turn_, time_ = 0, after_ = 0;
+  std::vector<Moment>* moments_ = nullptr;
   int leg_;  // counted on
   bool first_ = true;
   State state_{};

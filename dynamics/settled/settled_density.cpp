@@ -129,7 +129,11 @@ void restitutions(double from, double to, Use use) {
 class FirstImpact {
  public:
   FirstImpact(const SettledLanding& landing, double omega_plus)
-      : landing_(landing), lever_sq_(landing.gyration_sq + landing.ahead * landing.ahead) {
+      : gyration_sq_(landing.gyration_sq),
+        ahead_(landing.struck_ahead()),
+        height_(landing.struck_height()),
+        chord_(landing.struck_chord()),
+        lever_sq_(gyration_sq_ + ahead_ * ahead_) {
     // This is the speed lost by the law itself, of which `ratio` times as much was lost.
     const double ratio = landing.first_loss_ratio();
     lost_ = (1 - omega_plus / landing.omega) / ratio;
@@ -140,14 +144,14 @@ class FirstImpact {
   double sticking_rate() const { return rate_ / stuck_; }  // of that restitution with omega+
   // Returns mu, and its change with omega+.
   std::pair<double, double> friction(double eta) const {
-    const double lost = lost_ / (1 + eta), arm = landing_.chord - lost * landing_.ahead;
+    const double lost = lost_ / (1 + eta), arm = chord_ - lost * ahead_;
     if (!(arm > 0)) return {0, 0};
-    return {(landing_.chord * landing_.ahead - lost * lever_sq_) / (landing_.height * arm),
-            rate_ * landing_.chord * landing_.gyration_sq / (landing_.height * arm * arm * (1 + eta))};
+    return {(chord_ * ahead_ - lost * lever_sq_) / (height_ * arm),
+            rate_ * chord_ * gyration_sq_ / (height_ * arm * arm * (1 + eta))};
   }
 
  private:
-  const SettledLanding& landing_;
+  double gyration_sq_, ahead_, height_, chord_;  // of the first impact
   double lever_sq_, lost_, rate_, stuck_;
 };
 
@@ -331,7 +335,10 @@ void add_landings(NextTouchSum& sum, const SettledLanding& landing, const Settle
 
 double slide_score(double share) { return boost::math::quantile(boost::math::students_t(3), share); }
 
-double SettledLanding::plastic_loss() const { return chord * ahead / (gyration_sq + ahead * ahead + height * height); }
+double SettledLanding::plastic_loss(double friction) const {
+  const double d = struck_ahead(), h = struck_height();
+  return struck_chord() * (d - friction * h) / (gyration_sq + d * d - friction * d * h);
+}
 
 double SettledLanding::first_loss_ratio() const {
   const double lost = plastic_loss(), kept = 1 - lost;
@@ -339,9 +346,7 @@ double SettledLanding::first_loss_ratio() const {
 }
 
 double SettledLanding::first_impact(const Contact& contact) const {
-  const double mu = std::min(contact.friction, sticking());
-  const double lost =
-      (1 + contact.restitution) * chord * (ahead - mu * height) / (gyration_sq + ahead * ahead - mu * ahead * height);
+  const double lost = (1 + contact.restitution) * plastic_loss(std::min(contact.friction, sticking()));
   return std::max(0.0, 1 - first_loss_ratio() * lost);
 }
 

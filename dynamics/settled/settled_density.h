@@ -21,6 +21,10 @@ struct SettledLanding {
   double gyration_sq = 0;              ///< J / M about the centre of mass [m^2]
   double barrier_squared = 0;          ///< [rad^2/s^2]
   double loss_ratio = 1;               ///< multiplies what is lost of omega^2
+  // A soft tip changes these three of the first impact (SoftContact).
+  double turned = 0;          ///< by the wheel before half of the impulse is given [rad]
+  double pressed = 1;         ///< ratio of the normal impulse to a rigid tip's
+  double sticking_shift = 0;  ///< added to mu_c beside what the turn does
   /// omega-^2 of the next touch is next_rate omega_eq^2 + next_gain less what resisting torques take: a parabola, whose
   /// coefficients these are, of omega_eq^2 [rad^2/s^2].
   double next_rate = 1, next_gain = 0;
@@ -33,9 +37,16 @@ struct SettledLanding {
     return next_ratio * std::sqrt(std::max(1e-6, next_rate * omega_eq_squared + next_gain - taken));
   }
 
-  double sticking() const { return sticking_friction(ahead, height, gyration_sq); }  ///< mu_c
-  /// Returns the part of omega- that the first impact takes at eta = 0 if the foot sticks.
-  double plastic_loss() const;
+  /// Return the place of the landing foot and the distance to the old one as the first impact has them [m].
+  double struck_ahead() const { return ahead - height * turned; }
+  double struck_height() const { return height + ahead * turned; }
+  double struck_chord() const { return chord * pressed; }
+  /// Returns mu_c.
+  double sticking() const { return sticking_friction(struck_ahead(), struck_height(), gyration_sq) + sticking_shift; }
+  /// Returns the part of omega- that the first impact takes at eta = 0 with a friction of at most mu_c.
+  double plastic_loss(double friction) const;
+  /// Returns the same if the foot sticks.
+  double plastic_loss() const { return plastic_loss(sticking()); }
   /// Returns what multiplies the speed lost in a first impact: of that plastic one the energy lost is multiplied by
   /// `loss_ratio`. (A ratio of each impact's energy leaves a gap above omega+ = 0, and beside it ever denser speeds.)
   double first_loss_ratio() const;
