@@ -73,4 +73,10 @@ WalkerStudy study_walker(const WalkerSetting& setting, const markov::MeshStudyOp
   return study;
 }
 
+markov::SplittingStudy split_walker(const WalkerSetting& setting, const markov::SplittingOptions& options) {
+  const dynamics::WalkerMap map = setting.map();
+  const dynamics::Gait gait = dynamics::find_gait(map.walker(), setting.slope_deg * degree);
+  return markov::splitting_study(batch_map(map), gait_state(setting, gait), options);
+}
+
 }  // namespace metastable::analysis

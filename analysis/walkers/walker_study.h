@@ -9,6 +9,7 @@
 #include "dynamics/walkers/walker_map.h"
 #include "markov/mesh/batch_map.h"
 #include "markov/mesh/mesh_study.h"
+#include "markov/splitting/splitting_study.h"
 
 namespace metastable::analysis {
 
@@ -53,5 +54,10 @@ std::vector<double> gait_state(const WalkerSetting& setting, const dynamics::Gai
 /// @throws std::invalid_argument for a setting out of range; std::domain_error where there is no gait;
 ///         markov::MapError where it is unstable or no failure is found; as markov::mesh_study
 WalkerStudy study_walker(const WalkerSetting& setting, const markov::MeshStudyOptions& options = {});
+
+/// Does the same without a mesh, by splitting.
+/// @throws std::invalid_argument for a setting out of range; std::domain_error where there is no gait; as
+///         markov::splitting_study
+markov::SplittingStudy split_walker(const WalkerSetting& setting, const markov::SplittingOptions& options = {});
 
 }  // namespace metastable::analysis

@@ -1,5 +1,5 @@
 #pragma once
-// States what any stochastic return map of up to four dimensions is: what meshes and simulations ask of it.
+// States what any stochastic return map is: what meshes, splitting and simulations ask of it.
 
 #include <cstdint>
 #include <functional>
@@ -19,7 +19,7 @@ class MapError : public std::runtime_error {
 /// A stochastic return map, in batches: n states in rows of `dimension` numbers, scores in rows of `scores`
 /// independent standard normal numbers. The event at phase p is followed by the one at phase (p + 1) % phases.
 struct BatchMap {
-  int dimension = 1;               ///< 1 to 4
+  int dimension = 1;               ///< 1 to most_dimensions; meshes hold most_mesh_dimensions at most
   int scores = 1;                  ///< 1 or more; 0 for a map that draws for itself
   int phases = 1;                  ///< >= 1
   std::vector<std::string> names;  ///< of the numbers of a state, with units; empty: numbered
@@ -29,7 +29,7 @@ struct BatchMap {
                      std::span<std::uint8_t> failed)>
       step;
   /// Serves maps with scores = 0 instead of `step`: each row draws with random words of its own (words[i]). Such maps
-  /// can be simulated only; meshes refuse them, because the tails of their noise cannot be weighted.
+  /// can be simulated and split; meshes refuse them, because the tails of their noise cannot be weighted.
   std::function<void(int phase, std::span<const double> states, std::span<const std::uint64_t> words,
                      std::span<double> next, std::span<std::uint8_t> failed)>
       draw;
@@ -40,6 +40,8 @@ struct BatchMap {
   /// of many rows, of which some may turn out not to be needed. Answers are those of a map that is not dear.
   bool dear = false;
 };
+
+inline constexpr int most_dimensions = 30, most_mesh_dimensions = 4;
 
 /// Counts the rows at most that a dear map is asked for in one call: enough that the call itself costs nothing.
 inline constexpr std::size_t rows_of_a_dear_call = 16384;

@@ -106,15 +106,6 @@ MeshEstimate around(double value, double relative) {
   return {value, value * std::exp(-relative), value * std::exp(relative)};
 }
 
-/// Names two ways that disagree, or returns nothing.
-std::string disagreement(const char* one, const MeshEstimate& a, const char* other, const MeshEstimate& b) {
-  const double apart = std::abs(std::log(a.value / b.value));
-  if (!(a.lower > 0 && b.lower > 0) || apart <= disagrees * std::hypot(half_width(a), half_width(b))) return {};
-  return fmt::format(
-      "{} ({:.4g} steps, {:.4g} to {:.4g}) and {} ({:.4g}, {:.4g} to {:.4g}) disagree: no number is given", one,
-      a.value, a.lower, a.upper, other, b.value, b.lower, b.upper);
-}
-
 /// Says what trials to failure find alone where walks refute a mesh: "; ..." where enough fail within the steps
 /// allowed.
 /// @param walked  the step in which each walk failed, 0 if it walked on for `longest` steps
@@ -587,6 +578,14 @@ MeshStudy mesh_study(const BatchMap& map, std::span<const double> start, const M
     if (fails) throw Disagreement(text + ": no number is given");
     throw NoFailureFound(text);
   }
+}
+
+std::string disagreement(const char* one, const MeshEstimate& a, const char* other, const MeshEstimate& b) {
+  const double apart = std::abs(std::log(a.value / b.value));
+  if (!(a.lower > 0 && b.lower > 0) || apart <= disagrees * std::hypot(half_width(a), half_width(b))) return {};
+  return fmt::format(
+      "{} ({:.4g} steps, {:.4g} to {:.4g}) and {} ({:.4g}, {:.4g} to {:.4g}) disagree: no number is given", one,
+      a.value, a.lower, a.upper, other, b.value, b.lower, b.upper);
 }
 
 void require_agreement(const MeshStudy& study, const std::string& what) {

@@ -113,6 +113,9 @@ class Disagreement : public std::runtime_error {
 /// what simulation says where there is no orbit to centre a mesh on
 MeshStudy mesh_study(const BatchMap& map, std::span<const double> start, const MeshStudyOptions& options = {});
 
+/// Names two ways that lie further apart than 1.7 times their joint half-width, or returns nothing.
+std::string disagreement(const char* one, const MeshEstimate& a, const char* other, const MeshEstimate& b);
+
 /// @param what  was studied, for the message
 /// @throws Disagreement with MeshStudy::disagreement, unless that is empty
 void require_agreement(const MeshStudy& study, const std::string& what);

@@ -153,6 +153,10 @@ std::vector<NoiseFrame> noise_frames(const BatchMap& map, std::span<const double
 
 NoiseFreeOrbit noise_free_orbit(const BatchMap& map, std::span<const double> start) {
   require_start(map, start);
+  if (map.dimension > most_mesh_dimensions)
+    throw std::invalid_argument(
+        fmt::format("return map: {} dimensions, where meshes hold 1 to {}; --method splitting takes up to {}",
+                    map.dimension, most_mesh_dimensions, most_dimensions));
   if (map.scores == 0)
     throw MapError(
         "return map: it draws for itself, so the tails of its noise cannot be weighted; it can be simulated only");

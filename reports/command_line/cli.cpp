@@ -46,7 +46,9 @@ Command steps() {
           declare_steps,
           [](const Options& o, const std::string& line) {
             if (asks_for_walker(o)) {
-              WalkerRequest walker = walker_request(o, line, {"how-it-fails", "time-limit"});
+              WalkerRequest walker = walker_request(o, line, {"how-it-fails", "time-limit", "method", "tolerance"});
+              walker.method = walker_method(o);
+              walker.splitting = splitting_options(o);
               walker.time_limit = o.number("time-limit");
               walker.how_it_fails = o.flag("how-it-fails");
               return run_walker_steps(walker);

@@ -19,7 +19,7 @@ constexpr dynamics::Range time_limits{.low = 0, .high = 1e9, .low_open = true}; 
 void declare_steps(Options& o) {
   add_slope(o);
   add_launch(o, "Just before collision 1 [rad/s]");
-  add_wheel(o), add_contact(o), add_course(o), add_study(o);
+  add_wheel(o), add_contact(o), add_course(o), add_study(o, true);
   o.add_flag("direct", "Follow every landing instead of reading a table, hundreds of times slower (settled)");
   o.add_flag("certify", "Guaranteed bounds as well, refined to the width --tolerance (law published)");
   o.group("Question");

@@ -151,10 +151,14 @@ void add_course(Options& options) {
   options.add("first-leg", "I", "0", "Leg that lands at collision 1, from 0 to the number of legs less one");
 }
 
-void add_study(Options& options) {
+void add_study(Options& options, bool walkers) {
   options.group("Method and accuracy");
-  options.add("method", "sampled|integrated", "sampled",
-              "How rows are made: by sampling eta and mu per cell, or by quadrature over them (independent eta, mu)");
+  options.add("method", walkers ? "sampled|integrated|mesh|splitting|auto" : "sampled|integrated", "sampled",
+              std::string("How rows are made: by sampling eta and mu per cell, or by quadrature over them (independent "
+                          "eta, mu)") +
+                  (walkers ? ". With --walker: on meshes (default), by splitting, which takes any dimension, or auto: "
+                             "by both, held against each other"
+                           : ""));
   options.add("cells", "N", "", "Cells per landing leg, 8..4096 (default: refined until the tolerance is met)");
   options.add("samples", "S", "",
               "Draws per cell and replicate, 16..16777216 (default: raised until the tolerance is met)");

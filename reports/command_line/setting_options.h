@@ -23,7 +23,8 @@ void add_stated_contact(Options& options);
 void add_wheel(Options& options);
 void add_contact(Options& options);
 void add_course(Options& options);
-void add_study(Options& options);
+/// @param walkers  whether --method chooses among those of walkers, too
+void add_study(Options& options, bool walkers = false);
 void add_standard_errors(Options& options);
 
 /// Contacts in the place of those in the file of --contact-list, which only has to be given then.

@@ -96,6 +96,35 @@ markov::MeshStudyOptions mesh_options(const Options& o, const std::vector<std::s
   return study;
 }
 
+WalkerMethod walker_method(const Options& o) {
+  if (!o.given("method")) {
+    if (o.given("tolerance")) throw std::invalid_argument("--tolerance: has a meaning under --method splitting only");
+    return WalkerMethod::mesh;
+  }
+  const std::string name = o.text("method");
+  for (const auto& [known, method] : {std::pair("mesh", WalkerMethod::mesh),
+                                      std::pair("splitting", WalkerMethod::splitting), std::pair("auto", WalkerMethod::both)}) {
+    if (name != known) continue;
+    const bool meshes = method != WalkerMethod::splitting;
+    if (o.given("tolerance") && method == WalkerMethod::mesh)
+      throw std::invalid_argument("--tolerance: has no meaning under --method mesh");
+    for (const char* own : {"spacing", "memory", "simulated-steps", "how-it-fails"})
+      if (!meshes && o.given(own))
+        throw std::invalid_argument(fmt::format("--{}: has no meaning under --method splitting", own));
+    return method;
+  }
+  throw std::invalid_argument(
+      fmt::format("--method: '{}' is none of mesh, splitting, auto, which walkers have", name));
+}
+
+markov::SplittingOptions splitting_options(const Options& o) {
+  markov::SplittingOptions splitting;
+  splitting.seed = o.seed();
+  splitting.threads = o.threads();
+  if (o.given("tolerance")) splitting.tolerance = o.number("tolerance");
+  return splitting;
+}
+
 WalkerRequest walker_request(const Options& o, const std::string& command_line, std::vector<std::string> own) {
   WalkerRequest request = base_request(o, command_line, own);
   const analysis::WalkerSetting base = base_setting(o);

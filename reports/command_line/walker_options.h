@@ -24,6 +24,10 @@ WalkerRequest walker_request(const Options& options, const std::string& command_
                              std::vector<std::string> own = {});
 /// Likewise what meshes are told, of walkers and of simulators of one's own; `own` as above.
 markov::MeshStudyOptions mesh_options(const Options& options, const std::vector<std::string>& own);
+/// Reads the method of `steps`, "mesh" where none is given, and what splitting is told.
+/// @throws std::invalid_argument for a method that walkers lack, and for options that mean nothing under it
+WalkerMethod walker_method(const Options& options);
+markov::SplittingOptions splitting_options(const Options& options);
 /// @throws std::invalid_argument for a parameter to be solved for that is neither "slope" nor "slope-sd"
 void require_walker_parameter(const std::string& name);
 /// Reads the setting of a walker of which one of the two, "slope" or "slope-sd", is not given but solved for.

@@ -40,11 +40,42 @@ Provenance walker_provenance(const WalkerRequest& request) {
 
 }  // namespace
 
+std::optional<SplittingAnswer> ask_both_ways(WalkerMethod method, const std::string& name,
+                                             const std::function<const markov::MeshStudy*()>& mesh,
+                                             const std::function<markov::SplittingStudy()>& split) {
+  SplittingAnswer answer{name, {}, {}};
+  const markov::MeshStudy* found = nullptr;
+  if (method == WalkerMethod::mesh) mesh();
+  if (method == WalkerMethod::both) try {
+      found = mesh();
+    } catch (const markov::Disagreement& error) {
+      answer.no_mesh = error.what();
+    } catch (const markov::MapError& error) {
+      answer.no_mesh = error.what();
+    } catch (const std::length_error& error) {
+      answer.no_mesh = error.what();
+    }
+  if (method == WalkerMethod::mesh) return std::nullopt;
+  answer.passage = split();
+  if (found) markov::require_agreement(*found, answer.passage, name);
+  return answer;
+}
+
 WalkerAnswer answer_walker_steps(const WalkerRequest& request, const BeginPart& begin_part) {
   const BeginPart begin = within(request.time_limit, begin_part);
   const WalkerSetting& setting = request.settings.front();
-  WalkerAnswer answer{{agreed_walker(setting, request.study, begin("steps"))}, {}};
-  if (request.how_it_fails) {
+  WalkerAnswer answer;
+  answer.splitting = ask_both_ways(
+      request.method, setting.describe(),
+      [&] {
+        answer.studies.push_back(agreed_walker(setting, request.study, begin("steps")));
+        return &answer.studies.front().passage;
+      },
+      [&] {
+        return agreed_splitting(setting.describe(), request.splitting, begin("splitting"),
+                                [&](const auto& options) { return analysis::split_walker(setting, options); });
+      });
+  if (request.how_it_fails && !answer.studies.empty()) {
     const Tell tell = begin("how it fails");
     tell(0, "");
     answer.moments = analysis::how_it_falls(setting, answer.studies.front(), request.study).moments;
@@ -61,12 +92,17 @@ WalkerAnswer answer_walker_compare(const WalkerRequest& request, const BeginPart
 
 std::string walker_answer_json(const WalkerRequest& request, const WalkerAnswer& answer) {
   if (request.settings.size() > 1) return walkers_json(request.settings, answer.studies, walker_provenance(request));
-  return walker_json(request.settings.front(), answer.studies.front(), answer.moments, walker_provenance(request));
+  if (answer.studies.empty()) return splitting_json(*answer.splitting, walker_provenance(request));
+  const std::string json =
+      walker_json(request.settings.front(), answer.studies.front(), answer.moments, walker_provenance(request));
+  return answer.splitting ? with_splitting_json(json, answer.splitting->passage) : json;
 }
 
 std::string walker_answer_text(const WalkerRequest& request, const WalkerAnswer& answer, std::size_t width) {
   if (request.settings.size() > 1) return walkers_text(request.settings, answer.studies);
-  return walker_text(request.settings.front(), answer.studies.front(), answer.moments, width);
+  if (answer.studies.empty()) return splitting_text(*answer.splitting);
+  const std::string text = walker_text(request.settings.front(), answer.studies.front(), answer.moments, width);
+  return answer.splitting ? with_splitting_text(text, answer.splitting->passage) : text;
 }
 
 namespace {

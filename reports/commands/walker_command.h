@@ -2,6 +2,7 @@
 // Runs steps, compare, sweep, simulate and report with --walker.
 
 #include <cstddef>
+#include <functional>
 #include <optional>
 #include <string>
 #include <utility>
@@ -10,14 +11,24 @@
 #include "analysis/statistics/last_moments.h"
 #include "analysis/walkers/walker_study.h"
 #include "analysis/walkers/walker_trials.h"
+#include "reports/study/splitting_text.h"
 #include "reports/study/study_progress.h"
 
 namespace metastable::reports {
+
+/// Says how `steps` finds its answer.
+enum class WalkerMethod {
+  mesh,
+  splitting,
+  both  ///< a mesh where it can be had, and splitting beside it
+};
 
 /// Holds what all of them have.
 struct WalkerRequest {
   std::vector<analysis::WalkerSetting> settings;  ///< one or more
   markov::MeshStudyOptions study;
+  WalkerMethod method = WalkerMethod::mesh;                  ///< of steps
+  markov::SplittingOptions splitting = {};                   ///< likewise
   std::string json;                                          ///< file, "-" for standard output, "" for none
   std::string out;                                           ///< file of a sweep, folder of trials or of a report
   std::string command;                                       ///< the command line, for provenance
@@ -31,9 +42,18 @@ struct WalkerRequest {
 
 /// Holds what `steps` and `compare` find; moments where they were asked for.
 struct WalkerAnswer {
-  std::vector<analysis::WalkerStudy> studies;  ///< a setting each
+  std::vector<analysis::WalkerStudy> studies;  ///< a setting each; none where there is no mesh
+  std::optional<SplittingAnswer> splitting = {};
   std::optional<analysis::LastMoments> moments;
 };
+/// Finds a mesh's answer, that of splitting, or both, held against each other.
+/// @param mesh  throws where there is no mesh
+/// @param split  finds the answer of splitting with a listener
+/// @returns the answer of splitting where it was asked
+/// @throws as these; markov::Disagreement where the two contradict each other
+std::optional<SplittingAnswer> ask_both_ways(WalkerMethod method, const std::string& name,
+                                             const std::function<const markov::MeshStudy*()>& mesh,
+                                             const std::function<markov::SplittingStudy()>& split);
 /// @throws as agreed_walker()
 WalkerAnswer answer_walker_steps(const WalkerRequest& request, const BeginPart& begin);
 WalkerAnswer answer_walker_compare(const WalkerRequest& request, const BeginPart& begin);

@@ -26,21 +26,36 @@
 namespace metastable::reports::python {
 namespace {
 
-py::array survival_array(const markov::MeshStudy& study) {
+py::array survival_array(const std::vector<double>& shares) {
   std::vector<double> survival{1};
-  survival.insert(survival.end(), study.survival.begin(), study.survival.end());
+  survival.insert(survival.end(), shares.begin(), shares.end());
   return array_of(std::move(survival));
 }
 
+struct Asked {
+  markov::MeshStudyOptions mesh;
+  markov::SplittingOptions splitting;
+  WalkerMethod method = WalkerMethod::mesh;
+};
+
 // Reads what a walker of the library or of one's own is asked, as `steps` and `compare` do.
-markov::MeshStudyOptions mesh_options_of(const Arguments& given, void (*declare)(Options&) = declare_steps) {
+Asked asked_of(const Arguments& given, bool several = false) {
   if (given.given("standard_errors")) throw std::invalid_argument("--standard-errors: has no meaning with --walker");
-  LooseOptions options(declare);
+  LooseOptions options(several ? declare_compare : declare_steps);
   given.give(*options);
   options->check_given();
-  markov::MeshStudyOptions study = mesh_options(*options, {"how-it-fails", "time-limit"});
-  read_guided_samples(given, study);
-  return study;
+  Asked asked;
+  if (several) {
+    asked.mesh = mesh_options(*options, {});
+  } else {
+    asked.mesh = mesh_options(*options, {"how-it-fails", "time-limit", "method", "tolerance"});
+    asked.method = walker_method(*options);
+    asked.splitting = splitting_options(*options);
+    if (asked.method == WalkerMethod::splitting && given.given("guided_samples"))
+      throw std::invalid_argument("guided_samples: has no meaning under --method splitting");
+  }
+  read_guided_samples(given, asked.mesh);
+  return asked;
 }
 
 double time_limit_of(const Arguments& given) {
@@ -51,7 +66,10 @@ WalkerRequest walker_request_of(const py::list& settings, const Arguments& given
   WalkerRequest request;
   for (const py::handle& fields : settings)
     request.settings.push_back(walker_setting_of(Arguments(fields.cast<py::dict>())));
-  request.study = mesh_options_of(given, settings.size() > 1 ? declare_compare : declare_steps);
+  const Asked asked = asked_of(given, settings.size() > 1);
+  request.study = asked.mesh;
+  request.method = asked.method;
+  request.splitting = asked.splitting;
   request.command = command;
   request.how_it_fails = given.flag("how_it_fails");
   request.time_limit = time_limit_of(given);
@@ -72,8 +90,12 @@ py::dict study_walkers(const py::list& settings, const py::dict& options, const 
   for (std::size_t i = 0; i < found.studies.size(); ++i)
     tables.push_back(mesh_table(request.settings[i].describe(), found.studies[i].passage,
                                 {command, {}, request.study.seed, version()}));
+  if (found.splitting && found.studies.empty())
+    tables.push_back(splitting_table(*found.splitting, {command, {}, request.study.seed, version()}));
   py::dict arrays;
-  if (request.settings.size() == 1) arrays["survival"] = survival_array(found.studies.front().passage);
+  if (request.settings.size() == 1)
+    arrays["survival"] = survival_array(found.studies.empty() ? found.splitting->passage.survival
+                                                              : found.studies.front().passage.survival);
   return answer(walker_answer_json(request, found), walker_answer_text(request, found, line_width), tables_html(tables),
                 arrays);
 }
@@ -92,7 +114,7 @@ PythonMap map_of(const py::dict& fields) {
   PythonMap map;
   map.step = fields["step"];
   map.name = given.text("name");
-  map.dimension = static_cast<int>(given.whole("dimension", 1, 4));
+  map.dimension = static_cast<int>(given.whole("dimension", 1, markov::most_dimensions));
   map.scores = static_cast<int>(given.whole("noise", 1, 16));
   map.phases = static_cast<int>(given.whole("phases", 1, 64));
   map.names = given.texts("names");
@@ -129,31 +151,52 @@ py::dict study_map(const py::dict& fields, const py::dict& options, const std::s
                    const py::object& progress) {
   const PythonMap python = map_of(fields);
   const Arguments given(options);
-  markov::MeshStudyOptions study = mesh_options_of(given);
+  Asked asked = asked_of(given);
   const bool how_it_fails = given.flag("how_it_fails");
   const double time_limit = time_limit_of(given);
   MapStudy found{python.name, python.names, {}};
   for (int k = static_cast<int>(found.names.size()); k < python.dimension; ++k)
     found.names.push_back(fmt::format("x{}", k + 1));
   std::optional<analysis::LastMoments> moments;
+  std::optional<SplittingAnswer> splitting;
+  bool on_mesh = false;
   Call call(progress);
   const markov::BatchMap map = batch_of(python, call);
   call.run([&] {
-    const Tell tell = within(time_limit, parts_of(call))("steps");
-    study.progress = [&](double share) { tell(share, "steps"); };
-    found.passage = markov::mesh_study(map, python.start, study);
-    markov::require_agreement(found.passage, python.name);
-    if (!how_it_fails) return;
+    const BeginPart begin = within(time_limit, parts_of(call));
+    splitting = ask_both_ways(
+        asked.method, python.name,
+        [&] {
+          const Tell tell = begin("steps");
+          asked.mesh.progress = [&](double share) { tell(share, "steps"); };
+          found.passage = markov::mesh_study(map, python.start, asked.mesh);
+          markov::require_agreement(found.passage, python.name);
+          on_mesh = true;
+          return &found.passage;
+        },
+        [&] {
+          return agreed_splitting(python.name, asked.splitting, begin("splitting"), [&](const auto& options) {
+            return markov::splitting_study(map, python.start, options);
+          });
+        });
+    if (!how_it_fails || !on_mesh) return;
     call.tell(0, "how it fails");
     std::vector<analysis::NamedNoise> noises;
     for (const std::string& name : python.noise_names) noises.push_back({name});
-    moments = analysis::how_it_falls(map, python.start, noises, found.passage, study).moments;
+    moments = analysis::how_it_falls(map, python.start, noises, found.passage, asked.mesh).moments;
   });
-  const Provenance provenance{command, python.name, study.seed, version()};
+  const Provenance provenance{command, python.name, asked.mesh.seed, version()};
   py::dict arrays;
-  arrays["survival"] = survival_array(found.passage);
-  return answer(map_json(found, moments, provenance), map_text(found, moments, line_width),
-                to_html(mesh_table(python.name, found.passage, provenance)), arrays);
+  arrays["survival"] = survival_array(on_mesh ? found.passage.survival : splitting->passage.survival);
+  if (!on_mesh)
+    return answer(splitting_json(*splitting, provenance), splitting_text(*splitting),
+                  to_html(splitting_table(*splitting, provenance)), arrays);
+  std::string json = map_json(found, moments, provenance), text = map_text(found, moments, line_width);
+  if (splitting) {
+    json = with_splitting_json(json, splitting->passage);
+    text = with_splitting_text(text, splitting->passage);
+  }
+  return answer(json, text, to_html(mesh_table(python.name, found.passage, provenance)), arrays);
 }
 
 py::dict simulate_map(const py::dict& fields, const py::dict& options, const py::object& progress) {

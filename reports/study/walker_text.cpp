@@ -110,22 +110,16 @@ MeshEstimate ratio(const MeshEstimate& a, const MeshEstimate& b) {
           value * std::exp(std::hypot(std::log(b.upper / b.value), std::log(a.value / a.lower)))};
 }
 
-std::string with_interval(const MeshEstimate& e) {
-  const DecimalEstimate text = to_decimal(estimate_of(e), NumberFormat::general, 12);
-  return fmt::format("{} (95 % interval {} to {})", plain_text(text.value), plain_text(text.lower),
-                     plain_text(text.upper));
-}
-
 constexpr double negligible_blind = 1e-4;  // of the failures: less is not told
 
 Lines head_lines(const markov::MeshStudy& s) {
-  return {{"expected steps before failure", with_interval(s.steps)},
-          {"  from the metastable regime", with_interval(markov::steps_from_quasi_stationary(s))},
-          {"  by guided sampling", s.guided ? with_interval(*s.guided) : s.no_guided},
-          {"  by direct simulation", s.simulated ? with_interval(*s.simulated) : s.no_simulated},
+  return {{"expected steps before failure", estimate_text(s.steps)},
+          {"  from the metastable regime", estimate_text(markov::steps_from_quasi_stationary(s))},
+          {"  by guided sampling", s.guided ? estimate_text(*s.guided) : s.no_guided},
+          {"  by direct simulation", s.simulated ? estimate_text(*s.simulated) : s.no_simulated},
           {"status", s.guided || s.simulated ? "agreed: the independent ways lie within their joint intervals"
                                              : "the mesh alone"},
-          {"failure rate per step", with_interval(s.failure_rate)},
+          {"failure rate per step", estimate_text(s.failure_rate)},
           {"mixing", fmt::format("{:.3g} steps", s.mixing_steps)}};
 }
 
@@ -175,6 +169,12 @@ analysis::WalkerStudy agreed_walker(const WalkerSetting& setting, const markov::
   tell(1, "");
   markov::require_agreement(study.passage, setting.describe());
   return study;
+}
+
+std::string estimate_text(const MeshEstimate& e) {
+  const DecimalEstimate text = to_decimal(estimate_of(e), NumberFormat::general, 12);
+  return fmt::format("{} (95 % interval {} to {})", plain_text(text.value), plain_text(text.lower),
+                     plain_text(text.upper));
 }
 
 const char* walker_status(const markov::MeshStudy& study) {

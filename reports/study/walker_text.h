@@ -46,6 +46,9 @@ std::string walkers_text(const std::vector<analysis::WalkerSetting>& settings,
 /// Does the same as a table: quantities down.
 Table mesh_table(const std::string& name, const markov::MeshStudy& study, const Provenance& provenance);
 
+/// Returns "28.19 (95 % interval 28.14 to 28.27)".
+std::string estimate_text(const markov::MeshEstimate& estimate);
+
 /// Returns "agreed", "mesh_alone".
 const char* walker_status(const markov::MeshStudy& study);
 

@@ -214,7 +214,7 @@ def study(setting, *, method=None, cells=None, samples=None, tolerance=None, seq
 
     Of a Setting:
     tolerance        relative half-width wanted of the interval of the expected steps, (0, 1); None: 0.01
-    method           "sampled", or "integrated" for many digits; None: "sampled"
+    method           "sampled", or "integrated" for many digits; None: "sampled". Of a WalkerSetting or a Walker see below
     cells, samples   a landing leg, 8 to 4096, and draws a cell, 16 to 2^24; None: refined until the tolerance is met
     sequence         of the draws, "sobol" or "random"; draws: "weighted" or "plain"; tail: the probability they reach
     replicates       independent randomisations behind the interval, 2 to 64; None: 8
@@ -226,6 +226,10 @@ def study(setting, *, method=None, cells=None, samples=None, tolerance=None, seq
     standard_errors  of parameters by name, {"friction_mean": 0.01}: an interval from them is given apart
 
     Of a WalkerSetting or a Walker:
+    method           "mesh"; "splitting", which takes a Walker of any dimension: an ensemble of replicas, split where
+                     failures are near; or "auto": a mesh where it can be had and splitting beside it, which have to
+                     agree; None: "mesh"
+    tolerance        relative half-width wanted of the interval by splitting, (0, 1); None: 0.05
     spacing          of the coarsest mesh, in stationary sds of the noise, 0.05 to 2; None: by dimension
     simulated_steps  how many steps, about, direct simulation takes beside it, however rare failures are; None: 2
                      million, 0: none, and failures that the meshes step over may go unseen
@@ -667,8 +671,8 @@ def walker(step, dimension, noise, *, start, names=(), noise_names=(), phases=1,
                  function of its arguments alone; states that make no sense have failed. With phases > 1 it is called
                  as step(state, noise, phase). It runs in the thread that called, one call at a time, on as many
                  rows as there are at once, some of which may turn out not to be needed.
-    dimension    numbers of a state, 1 to 4
-    noise        numbers of noise a step, 1 or more
+    dimension    numbers of a state, 1 to 30; above 4 study() takes method="splitting"
+    noise        numbers of noise a step, 1 to 16
     start        the state that walks begin from, at phase 0: expected steps are counted from it. Without noise the map
                  has to settle from it into an orbit, the gait, which meshes are centred on and the answer tells
                  (`gait`); expected steps from the metastable regime, `expected_steps.from_quasi_stationary`, do not

@@ -64,7 +64,7 @@ class Machine:
         return {key: list(value) if isinstance(value, tuple) else value for key, value in self.__dict__.items()}
 
     def walker(self, start=None, **values):
-        """Its nominal model as a Walker of one to four states, for study() and simulate().
+        """Its nominal model as a Walker, for study() and simulate().
 
         start   the state that walks begin from; None: the means of `launch`
         values  of parameters and of the effects' parameters that differ from the nominal and the neutral ones

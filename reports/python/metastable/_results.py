@@ -267,7 +267,8 @@ class Solution(Result):
 class WalkerStudy(Result):
     """How long a walker, or a simulator of your own, walks. Fields: `steps --walker --json` of reports/README.md."""
 
-    gait = how_it_fails = None  # where there is a gait to tell of; where it was asked for
+    # Where there is a gait to tell of; where it was asked for; where splitting stands beside a mesh, or no mesh beside it.
+    gait = how_it_fails = splitting = no_mesh = None
 
     def _headline(self):
         return f"{_steps(self.expected_steps.value, self.expected_steps.interval_95)}, {self.status}"

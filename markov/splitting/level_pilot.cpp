@@ -1,0 +1,194 @@
+#include "markov/splitting/level_pilot.h"
+
+#include <fmt/format.h>
+
+#include <Eigen/Core>
+#include <algorithm>
+#include <cmath>
+#include <stdexcept>
+#include <utility>
+#include <vector>
+
+#include "markov/dense_matrix.h"
+#include "markov/mesh/score_lattice.h"
+#include "markov/splitting/learnt_level.h"
+#include "markov/splitting/stratified_scores.h"
+
+namespace metastable::markov {
+namespace {
+
+constexpr int refinements = 3;
+constexpr std::uint64_t enough_failures = 50;  // replicas
+constexpr double shortest_spread = 30;         // [steps]
+constexpr double left_of_memory = 0.05;
+constexpr std::size_t kept_times = 60;  // steps of which visits are kept
+constexpr std::uint64_t pairs_stream = 0xa000;
+
+class Pilot {
+ public:
+  Pilot(const BatchMap& map, std::span<const double> start, const PilotOptions& options)
+      : map_(map), options_(options), ensemble_(map, start, options.replicas, options.seed, options.stream) {
+    visits_.phases.resize(static_cast<std::size_t>(map.phases));
+  }
+
+  LevelPilot run() {
+    settle();
+    const std::uint64_t window = revolutions(1.5 * pilot_.mixing_steps);
+    pilot_.window = window;
+    Levels levels{options_.level ? options_.level : distance_level(frames_, map_.dimension), {}};
+    const std::uint64_t failed_before = ensemble_.failures();
+    auto steps = std::max(window, revolutions(shortest_spread));
+    std::size_t bins = 0;
+    do {
+      if (calls() > options_.most_calls)
+        throw std::runtime_error(fmt::format(
+            "splitting: {} in {} steps of the map, pushed as far from the middle as they go: no number is "
+            "given",
+            ensemble_.failures() == 0 ? "nothing fails" : fmt::format("only {} replicas fail", ensemble_.failures()),
+            calls()));
+      split(levels);
+      // Where no more bins came of it, few replicas reach beyond the last one: they are waited for.
+      const std::size_t now = levels.edges.front().size();
+      if (now <= bins) steps += revolutions(static_cast<double>(steps) / 2);
+      bins = now;
+      spread(steps);
+    } while (ensemble_.failures() - failed_before < enough_failures);
+    for (int k = 0; k < refinements; ++k) {
+      if (!options_.level) {
+        LearntLevel learnt = learn_level(map_, frames_, visits_, levels.edges,
+                                         {.anchors = options_.replicas,
+                                          .window = static_cast<int>(window),
+                                          .seed = options_.seed,
+                                          .stream = options_.stream + 100 * static_cast<std::uint64_t>(k)});
+        more_calls_ += learnt.calls;
+        pilot_.window = static_cast<std::uint64_t>(learnt.window);
+        levels.level = std::move(learnt.level);
+      }
+      split(levels);
+      spread(std::max(2 * pilot_.window, revolutions(shortest_spread)));
+    }
+    split(levels);
+    pilot_.levels = std::move(levels);
+    pilot_.calls = calls();
+    return std::move(pilot_);
+  }
+
+ private:
+  std::uint64_t calls() const { return ensemble_.calls() + more_calls_; }
+
+  std::uint64_t revolutions(double steps) const {
+    const auto phases = static_cast<double>(map_.phases);
+    return static_cast<std::uint64_t>(std::max(1.0, std::ceil(steps / phases)) * phases);
+  }
+
+  /// Walks on and keeps visits of the steps' second half, of so many times at most.
+  void spread(std::uint64_t steps) {
+    visits_.clear();
+    const auto phases = static_cast<std::uint64_t>(map_.phases);
+    const std::uint64_t kept = std::max<std::uint64_t>(1, (steps / 2 + kept_times - 1) / kept_times);
+    for (std::uint64_t n = 0; n < steps; ++n) {
+      ensemble_.advance();
+      if (options_.told) options_.told();
+      if (2 * n + 2 * phases >= steps && n / phases % kept == 0) visits_.add(ensemble_);
+    }
+  }
+
+  /// Lets the start be forgotten, and finds coordinates and how long memory lasts.
+  void settle() {
+    std::uint64_t steps = revolutions(64);
+    for (;;) {
+      spread(steps);
+      frames_.clear();
+      for (const Visits::Phase& phase : visits_.phases) frames_.emplace_back(map_, phase);
+      pilot_.mixing_steps = mixing();
+      if (4 * pilot_.mixing_steps <= static_cast<double>(ensemble_.steps()) || calls() > options_.most_calls) return;
+      steps = revolutions(std::min(4 * pilot_.mixing_steps, 4.0 * static_cast<double>(ensemble_.steps())));
+    }
+  }
+
+  /// Regresses states on those a revolution before.
+  double mixing() {
+    const auto d = static_cast<std::size_t>(map_.dimension), s = static_cast<std::size_t>(map_.scores);
+    const Visits::Phase& visits = visits_.phases[0];
+    const std::size_t n = std::min<std::size_t>(visits.weights.size(), 4000);
+    std::vector<double> states, scores(n * s), next(n * d), weight;
+    for (std::size_t i = 0; i < n; ++i) {
+      const std::size_t from = i * visits.weights.size() / n;
+      states.insert(states.end(), &visits.states[from * d], &visits.states[from * d] + d);
+    }
+    const std::vector<double> first = states;
+    std::vector<std::uint8_t> failed(n), gone(n, 0);
+    std::vector<std::uint64_t> words(n);
+    std::vector<std::size_t> alive(n);
+    for (std::size_t i = 0; i < n; ++i) alive[i] = i;
+    for (int phase = 0; phase < map_.phases && !alive.empty(); ++phase) {
+      const std::size_t m = alive.size();
+      const std::uint64_t stream = pairs_stream + (options_.stream << 16);
+      scores.resize(m * s), next.resize(m * d), failed.assign(m, 0), words.resize(m), weight.resize(m);
+      if (s > 0) stratified_scores(options_.seed, stream, static_cast<std::uint64_t>(phase), scores, weight);
+      for (std::size_t i = 0; i < m; ++i)
+        words[i] = random_words(options_.seed, stream, i, static_cast<std::uint64_t>(phase))[0];
+      if (s > 0)
+        checked_step(map_, phase, states, scores, next, failed);
+      else
+        checked_draw(map_, phase, states, words, next, failed);
+      more_calls_ += m;
+      std::size_t left = 0;
+      for (std::size_t i = 0; i < m; ++i) {
+        if (failed[i]) continue;
+        alive[left] = alive[i];
+        std::copy_n(&next[i * d], d, &states[left++ * d]);
+      }
+      alive.resize(left), states.resize(left * d);
+    }
+    Eigen::MatrixXd before(alive.size(), d), after(alive.size(), d);
+    std::vector<float> at(d);
+    for (std::size_t i = 0; i < alive.size(); ++i)
+      for (const bool later : {false, true}) {
+        frames_[0].place(later ? std::span<const double>(states).subspan(i * d, d)
+                               : std::span<const double>(first).subspan(alive[i] * d, d),
+                         at);
+        for (std::size_t k = 0; k < d; ++k)
+          (later ? after : before)(static_cast<Eigen::Index>(i), static_cast<Eigen::Index>(k)) =
+              static_cast<double>(at[k]);
+      }
+    if (alive.size() < 2 * d) return static_cast<double>(map_.phases);
+    const Eigen::MatrixXd gram =
+        before.transpose() * before +
+        1e-3 * static_cast<double>(alive.size()) * Eigen::MatrixXd::Identity(before.cols(), before.cols());
+    const double radius = spectral_radius(solve_columns(gram, before.transpose() * after));
+    return map_.phases * std::max(1.0, std::log(left_of_memory) / std::log(std::clamp(radius, 1e-3, 0.9999)));
+  }
+
+  /// Gives the visits these levels, and the ensemble edges between them.
+  void split(Levels& levels) {
+    const auto d = static_cast<std::size_t>(map_.dimension);
+    for (std::size_t p = 0; p < visits_.phases.size(); ++p) {
+      Visits::Phase& visits = visits_.phases[p];
+      levels.level(static_cast<int>(p), visits.states, visits.levels);
+      for (std::size_t i = 0; i < visits.levels.size(); ++i)
+        if (!std::isfinite(visits.levels[i]))
+          throw MapError(fmt::format("level function: it is {} at the state {} (phase {}), a finite number expected",
+                                     visits.levels[i], describe_state(map_, std::span(visits.states).subspan(i * d, d)),
+                                     p));
+    }
+    levels.edges = quantile_edges(visits_);
+    ensemble_.set_levels(levels);
+  }
+
+  const BatchMap& map_;
+  const PilotOptions& options_;
+  WeightedEnsemble ensemble_;
+  Visits visits_;
+  std::vector<VisitFrame> frames_;
+  LevelPilot pilot_;
+  std::uint64_t more_calls_ = 0;
+};
+
+}  // namespace
+
+LevelPilot level_pilot(const BatchMap& map, std::span<const double> start, const PilotOptions& options) {
+  return Pilot(map, start, options).run();
+}
+
+}  // namespace metastable::markov

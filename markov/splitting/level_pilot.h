@@ -1,0 +1,34 @@
+#pragma once
+// Explores a return map with an ensemble until failures are found, and learns what to split by.
+
+#include <cstdint>
+#include <functional>
+#include <span>
+
+#include "markov/mesh/batch_map.h"
+#include "markov/splitting/weighted_ensemble.h"
+
+namespace metastable::markov {
+
+struct PilotOptions {
+  LevelFunction level = {};  ///< to split by; empty: the distance from what is visited, then what is learnt
+  std::size_t replicas = 1000;
+  std::uint64_t most_calls = 10000000;
+  std::uint64_t seed = 1, stream = 0;
+  std::function<void()> told = {};  ///< called after every step; may throw to stop
+};
+
+struct LevelPilot {
+  Levels levels;
+  double mixing_steps = 0;   ///< after which 0.05 is left of what is remembered of a state, by linear regression
+  std::uint64_t window = 0;  ///< in which failures that begin in the middle come about [steps]
+  std::uint64_t calls = 0;
+};
+
+/// Lets an ensemble spread, first by its distance from where it mostly is, until replicas fail; then learns from what
+/// it visited the chance of failing within 1.5 mixing times (learn_level), spreads it by that, and learns again, three
+/// times in all.
+/// @throws std::runtime_error where no replica fails within most_calls; MapError as WeightedEnsemble
+LevelPilot level_pilot(const BatchMap& map, std::span<const double> start, const PilotOptions& options);
+
+}  // namespace metastable::markov

@@ -1,0 +1,290 @@
+#include "markov/splitting/splitting_study.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <atomic>
+#include <boost/math/distributions/fisher_f.hpp>
+#include <boost/math/distributions/students_t.hpp>
+#include <cmath>
+#include <memory>
+#include <stdexcept>
+#include <utility>
+
+#include "markov/parallel.h"
+#include "markov/splitting/level_pilot.h"
+
+namespace metastable::markov {
+namespace {
+
+constexpr double fewest_lines = 30;
+constexpr double refused_level = 1e-3;
+constexpr double widest = 4;  // upper over lower end of an interval that is given
+
+/// One independent ensemble and what was seen of it.
+struct Round {
+  std::unique_ptr<WeightedEnsemble> ensemble;
+  std::vector<double> early;   ///< share that fails in each step of the burn-in
+  std::vector<double> shares;  ///< and after it
+};
+
+/// Holds what rounds say together.
+struct Pooled {
+  double steps = 0, rate = 0;
+};
+
+class Study {
+ public:
+  Study(const BatchMap& map, std::span<const double> start, const SplittingOptions& options)
+      : map_(map), start_(start), options_(options) {}
+
+  SplittingStudy run() {
+    learn();
+    rounds_.resize(static_cast<std::size_t>(options_.rounds));
+    const std::uint64_t revolution = static_cast<std::uint64_t>(map_.phases);
+    burn_in_ = whole(std::max(3 * mixing_, 2.0 * static_cast<double>(window_)), revolution);
+    std::uint64_t more = whole(std::max(4 * mixing_, 100.0), 2 * revolution);
+    for (;;) {
+      walk(more);
+      estimate();
+      const double half = 0.5 * std::log(found_.steps.upper / found_.steps.lower);
+      if (half <= options_.tolerance) break;
+      const double wanted =
+          std::isfinite(half) ? std::clamp(1.1 * half * half / (options_.tolerance * options_.tolerance) - 1, 0.25, 3.0)
+                              : 3.0;
+      const double affordable = (static_cast<double>(options_.most_calls) - static_cast<double>(calls_)) /
+                                (static_cast<double>(options_.replicas) * options_.rounds);
+      const auto taken = static_cast<double>(rounds_.front().shares.size());
+      if (affordable < 0.25 * taken) break;
+      more = whole(std::min(wanted * taken, affordable), 2 * revolution);
+    }
+    judge();
+    return std::move(found_);
+  }
+
+ private:
+  static std::uint64_t whole(double steps, std::uint64_t revolution) {
+    return std::max<std::uint64_t>(1, static_cast<std::uint64_t>(std::ceil(steps / static_cast<double>(revolution)))) *
+           revolution;
+  }
+
+  void tell(double share) const {
+    if (options_.progress) options_.progress(share);
+  }
+
+  void learn() {
+    pilots_.resize(static_cast<std::size_t>(options_.pilots));
+    const auto told = one_at_a_time([this] { tell(0); });
+    parallel_for(pilots_.size(), options_.threads, [&](std::size_t k) {
+      pilots_[k] = level_pilot(map_, start_,
+                               {.level = options_.level,
+                                .replicas = options_.replicas,
+                                .most_calls = options_.most_calls / 4 / pilots_.size(),
+                                .seed = options_.seed,
+                                .stream = 1000 + k,
+                                .told = told});
+    });
+    for (const LevelPilot& pilot : pilots_) {
+      mixing_ = std::max(mixing_, pilot.mixing_steps);
+      window_ = std::max(window_, pilot.window);
+      calls_ += pilot.calls;
+    }
+    found_.pilot_calls = calls_;
+  }
+
+  void walk(std::uint64_t more) {
+    const std::uint64_t before = rounds_.front().shares.size();
+    const double whole_work =
+        static_cast<double>(rounds_.size()) * static_cast<double>(more + (before == 0 ? burn_in_ : 0));
+    std::atomic<std::uint64_t> done = 0;
+    const auto told = one_at_a_time([&] { tell(std::min(1.0, static_cast<double>(done) / whole_work)); });
+    parallel_for(rounds_.size(), options_.threads, [&](std::size_t r) {
+      Round& round = rounds_[r];
+      if (!round.ensemble) {
+        round.ensemble = std::make_unique<WeightedEnsemble>(map_, start_, options_.replicas, options_.seed, r);
+        round.ensemble->set_levels(pilots_[r % pilots_.size()].levels);
+        for (std::uint64_t n = 0; n < burn_in_; ++n) {
+          round.early.push_back(round.ensemble->advance());
+          ++done, told();
+        }
+      }
+      for (std::uint64_t n = 0; n < more; ++n) {
+        if (round.shares.size() % window_ == 0) round.ensemble->mark();
+        round.shares.push_back(round.ensemble->advance());
+        ++done, told();
+      }
+    });
+    std::uint64_t called = found_.pilot_calls;
+    for (const Round& round : rounds_) called += round.ensemble->calls();
+    calls_ = called;
+  }
+
+  /// Returns the mean share that fails at each phase, of one round, over [first, last) of its steps.
+  std::vector<double> shares_by_phase(const Round& round, std::size_t first, std::size_t last) const {
+    const auto phases = static_cast<std::size_t>(map_.phases);
+    std::vector<double> sum(phases, 0);
+    for (std::size_t n = first; n < last; ++n) sum[n % phases] += round.shares[n];
+    for (double& one : sum) one /= static_cast<double>((last - first) / phases);
+    return sum;
+  }
+
+  /// Pools all rounds but one (or none: left_out = rounds).
+  Pooled pooled(std::size_t left_out, std::vector<double>* survival = nullptr) const {
+    const auto phases = static_cast<std::size_t>(map_.phases);
+    const double count = static_cast<double>(rounds_.size()) - (left_out < rounds_.size() ? 1 : 0);
+    std::vector<double> alive(burn_in_ + 1, 0), share(phases, 0);
+    for (std::size_t r = 0; r < rounds_.size(); ++r) {
+      if (r == left_out) continue;
+      double now = 1;
+      for (std::size_t n = 0; n <= burn_in_; ++n) {
+        alive[n] += now / count;
+        if (n < burn_in_) now *= 1 - rounds_[r].early[n];
+      }
+      const std::vector<double> own = shares_by_phase(rounds_[r], 0, rounds_[r].shares.size());
+      for (std::size_t p = 0; p < phases; ++p) share[p] += own[p] / count;
+    }
+    Pooled all;
+    for (std::size_t n = 0; n < burn_in_; ++n) all.steps += alive[n];
+    double now = 1, walked = 0, failed = 0;
+    for (const double one : share) {
+      walked += now;
+      failed += now * one;
+      now *= 1 - one;
+    }
+    all.steps += alive[burn_in_] * walked / failed;
+    all.rate = phases == 1 ? share[0] : -std::expm1(std::log1p(-failed) / static_cast<double>(phases));
+    if (survival) survival->assign(alive.begin() + 1, alive.end());
+    return all;
+  }
+
+  /// Takes the interval of a logarithm from the jackknife's values, one a round.
+  MeshEstimate interval(double value, const std::vector<double>& without) const {
+    const double n = static_cast<double>(without.size());
+    std::vector<double> own;
+    double mean = 0, squares = 0;
+    for (const double one : without) own.push_back(n * std::log(value) - (n - 1) * std::log(one));
+    for (const double one : own) mean += one / n;
+    for (const double one : own) squares += (one - mean) * (one - mean);
+    const double half = boost::math::quantile(boost::math::students_t(n - 1), 0.975) * std::sqrt(squares / (n - 1) / n);
+    return {value, value * std::exp(-half), value * std::exp(half)};
+  }
+
+  void estimate() {
+    found_.rounds = options_.rounds;
+    found_.round_steps = burn_in_ + rounds_.front().shares.size();
+    found_.calls = calls_;
+    found_.mixing_steps = mixing_;
+    const Pooled all = pooled(rounds_.size(), &found_.survival);
+    std::vector<double> steps, rates;
+    found_.rates.clear();
+    for (std::size_t r = 0; r < rounds_.size(); ++r) {
+      const Pooled others = pooled(r);
+      steps.push_back(others.steps);
+      rates.push_back(others.rate);
+      double mean = 0;
+      for (const double one : rounds_[r].shares) mean += one;
+      found_.rates.push_back(mean / static_cast<double>(rounds_[r].shares.size()));
+    }
+    found_.steps = interval(all.steps, steps);
+    found_.failure_rate = interval(all.rate, rates);
+    double sum = 0, squares = 0;
+    for (const Round& round : rounds_)
+      for (const double weight : round.ensemble->lines()) sum += weight, squares += weight * weight;
+    found_.lines = squares > 0 ? sum * sum / squares : 0;
+  }
+
+  void judge() {
+    const double ratio = found_.steps.upper / found_.steps.lower;
+    if (!(found_.lines >= fewest_lines))
+      found_.disagreement = fmt::format(
+          "splitting: {:.3g} independent lines of descent lead to failure in {} steps of the map, where {} are the "
+          "fewest that vouch for a number",
+          found_.lines, found_.calls, fewest_lines);
+    else if (!(ratio <= widest))
+      found_.disagreement = fmt::format(
+          "splitting: {} rounds of {} steps say {:.3g} to {:.3g} steps: they lie too far apart for a number",
+          found_.rounds, found_.round_steps, found_.steps.lower, found_.steps.upper);
+    else if (changing() < refused_level)
+      found_.disagreement = fmt::format(
+          "splitting: the failure rate of later steps differs from that of earlier ones, {} steps after the start: the "
+          "machine has not settled by then",
+          burn_in_);
+    else if (pilots_disagree() < refused_level)
+      found_.disagreement =
+          "splitting: rounds split by different levels find different failure rates: some ways to fail are not found "
+          "by all";
+  }
+
+  /// Returns the level at which the rates of the first and the second half differ.
+  double changing() const {
+    std::vector<double> change;
+    double mean = 0, squares = 0;
+    const double n = static_cast<double>(rounds_.size());
+    for (const Round& round : rounds_) {
+      const std::size_t half = round.shares.size() / 2;
+      double first = 0, second = 0;
+      for (std::size_t k = 0; k < half; ++k) first += round.shares[k], second += round.shares[half + k];
+      change.push_back(second - first);
+      mean += change.back() / n;
+    }
+    for (const double one : change) squares += (one - mean) * (one - mean);
+    if (!(squares > 0)) return 1;
+    const double t = std::abs(mean) / std::sqrt(squares / (n - 1) / n);
+    return 2 * boost::math::cdf(boost::math::complement(boost::math::students_t(n - 1), t));
+  }
+
+  /// Returns the level at which rates differ between the pilots' levels by more than between rounds of one.
+  double pilots_disagree() const {
+    const std::size_t groups = pilots_.size(), each = rounds_.size() / groups;
+    if (groups < 2 || each < 2) return 1;
+    double grand = 0, between = 0, within = 0;
+    for (const double rate : found_.rates) grand += rate / static_cast<double>(rounds_.size());
+    for (std::size_t g = 0; g < groups; ++g) {
+      double mean = 0;
+      for (std::size_t r = g; r < rounds_.size(); r += groups) mean += found_.rates[r] / static_cast<double>(each);
+      for (std::size_t r = g; r < rounds_.size(); r += groups) within += std::pow(found_.rates[r] - mean, 2);
+      between += static_cast<double>(each) * std::pow(mean - grand, 2);
+    }
+    const auto a = static_cast<double>(groups - 1), b = static_cast<double>(rounds_.size() - groups);
+    if (!(within > 0)) return 1;
+    return boost::math::cdf(boost::math::complement(boost::math::fisher_f(a, b), (between / a) / (within / b)));
+  }
+
+  const BatchMap& map_;
+  std::span<const double> start_;
+  const SplittingOptions& options_;
+  std::vector<LevelPilot> pilots_;
+  std::vector<Round> rounds_;
+  double mixing_ = 0;
+  std::uint64_t window_ = 1, burn_in_ = 0, calls_ = 0;
+  SplittingStudy found_;
+};
+
+}  // namespace
+
+MeshEstimate steps_from_quasi_stationary(const SplittingStudy& study) {
+  return {1 / study.failure_rate.value, 1 / study.failure_rate.upper, 1 / study.failure_rate.lower};
+}
+
+void require_agreement(const SplittingStudy& study, const std::string& what) {
+  if (!study.disagreement.empty()) throw Disagreement(fmt::format("{}: {}", what, study.disagreement));
+}
+
+void require_agreement(const MeshStudy& mesh, const SplittingStudy& splitting, const std::string& what) {
+  const std::string found = disagreement("the mesh", mesh.steps, "splitting", splitting.steps);
+  if (!found.empty()) throw Disagreement(fmt::format("{}: {}", what, found));
+}
+
+SplittingStudy splitting_study(const BatchMap& map, std::span<const double> start, const SplittingOptions& options) {
+  require_start(map, start);
+  if (options.replicas < 100)
+    throw std::invalid_argument(fmt::format("splitting: {} replicas, 100 or more expected", options.replicas));
+  if (options.pilots < 1 || options.rounds < 8 || options.rounds % options.pilots != 0)
+    throw std::invalid_argument(fmt::format("splitting: {} rounds, 8 or more and a multiple of the {} pilots expected",
+                                            options.rounds, options.pilots));
+  if (!(options.tolerance > 0))
+    throw std::invalid_argument(fmt::format("splitting: a tolerance of {}, above 0 expected", options.tolerance));
+  return Study(map, start, options).run();
+}
+
+}  // namespace metastable::markov

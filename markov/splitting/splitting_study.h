@@ -1,0 +1,71 @@
+#pragma once
+// Finds expected steps of any return map by splitting, without a mesh: any dimension, any noise.
+
+#include <cstdint>
+#include <functional>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "markov/mesh/batch_map.h"
+#include "markov/mesh/mesh_study.h"
+#include "markov/splitting/weighted_ensemble.h"
+
+namespace metastable::markov {
+
+struct SplittingOptions {
+  LevelFunction level = {};              ///< that ensembles are split by; empty: learnt
+  std::size_t replicas = 1000;           ///< of one ensemble, >= 100
+  int rounds = 16;                       ///< independent ensembles, >= 8, a multiple of the pilots
+  int pilots = 4;                        ///< that each learn a level of their own, >= 1
+  double tolerance = 0.05;               ///< wanted half-width of the 95 % interval of ln steps, > 0
+  std::uint64_t most_calls = 400000000;  ///< rows that the map is asked for, in all
+  std::uint64_t seed = 1;
+  int threads = 0;  ///< 0: all cores; the bits do not depend on it
+  /// It is called with the share of the work that is done, 0 until that can be foretold, from any thread but one at a
+  /// time, and may throw to stop.
+  std::function<void(double)> progress = {};
+};
+
+struct SplittingStudy {
+  MeshEstimate steps;            ///< expected steps before failure from the start
+  MeshEstimate failure_rate;     ///< a step, from the quasi-stationary distribution
+  double mixing_steps = 0;       ///< after which 0.05 of what is remembered of a state is left, to first order
+  std::vector<double> survival;  ///< [k]: share that walks on after k + 1 steps; beyond the last at the failure rate
+  int rounds = 0;
+  std::uint64_t round_steps = 0;  ///< that each took
+  std::uint64_t calls = 0;        ///< rows that the map was asked for, those of the pilots included
+  std::uint64_t pilot_calls = 0;
+  double lines = 0;           ///< independent lines of descent that lead to failure: (sum w)^2 / sum w^2
+  std::vector<double> rates;  ///< of each round
+  /// Empty, or a sentence that says why `steps` must not be used.
+  std::string disagreement;
+};
+
+/// Returns the expected steps of survivors who have forgotten the start: one over the failure rate.
+MeshEstimate steps_from_quasi_stationary(const SplittingStudy& study);
+
+/// Lets `pilots` ensembles explore and learn what to split by, and `rounds` independent ones be split by that. Each
+/// starts at `start`, is followed through a burn-in of three mixing times or two windows, which tells how survival
+/// begins, and then until the failure rates of all give an interval as narrow as asked, or most_calls is reached.
+/// Expected steps are the survival's sum through the burn-in, and the rate beyond. The intervals are Student's, of the
+/// logarithm, over the jackknife's values of the rounds.
+///
+/// No number is given where fewer than 30 independent lines lead to failure (a line is founded one to two windows
+/// before; a window is 1.5 mixing times, and as many steps as a failure takes), where the interval is wider than a
+/// factor of four, and where, at a level of 0.001, rates change between the halves of the rounds or rounds split by
+/// different levels differ.
+/// @throws std::invalid_argument for options out of range; std::runtime_error where no replica fails, saying after how
+/// many steps of the map; MapError as WeightedEnsemble
+SplittingStudy splitting_study(const BatchMap& map, std::span<const double> start,
+                               const SplittingOptions& options = {});
+
+/// @param what  was studied, for the message
+/// @throws Disagreement with SplittingStudy::disagreement, unless that is empty
+void require_agreement(const SplittingStudy& study, const std::string& what);
+
+/// Holds a mesh's expected steps against those of splitting, as the other ways of MeshStudy.
+/// @throws Disagreement where they lie further apart than 1.7 times their joint half-width
+void require_agreement(const MeshStudy& mesh, const SplittingStudy& splitting, const std::string& what);
+
+}  // namespace metastable::markov

@@ -1,0 +1,96 @@
+#include "reports/study/splitting_text.h"
+
+#include <fmt/format.h>
+
+#include <nlohmann/json.hpp>
+#include <utility>
+#include <vector>
+
+#include "reports/study/walker_text.h"
+
+namespace metastable::reports {
+namespace {
+
+using Json = nlohmann::ordered_json;
+using Lines = std::vector<std::pair<std::string, std::string>>;
+
+Json study_json(const markov::SplittingStudy& s) {
+  const markov::MeshEstimate regime = markov::steps_from_quasi_stationary(s);
+  Json survival = {1.0};
+  for (const double share : s.survival) survival.push_back(share);
+  return {{"expected_steps",
+           {{"value", s.steps.value},
+            {"interval_95", {s.steps.lower, s.steps.upper}},
+            {"from_quasi_stationary", regime.value},
+            {"from_quasi_stationary_interval_95", {regime.lower, regime.upper}}}},
+          {"failure_rate_per_step",
+           {{"value", s.failure_rate.value}, {"interval_95", {s.failure_rate.lower, s.failure_rate.upper}}}},
+          {"survival", survival},
+          {"mixing_steps", s.mixing_steps},
+          {"rounds", s.rounds},
+          {"steps_of_a_round", s.round_steps},
+          {"rates_of_rounds", s.rates},
+          {"lines_to_failure", s.lines},
+          {"steps_of_the_map", s.calls}};
+}
+
+Lines effort_lines(const markov::SplittingStudy& s) {
+  return {{"rounds", fmt::format("{} of {} steps", s.rounds, s.round_steps)},
+          {"independent lines to failure", fmt::format("{:.3g}", s.lines)},
+          {"steps of the map", fmt::format("{:.3g}, {:.3g} of them to learn what to split by",
+                                           static_cast<double>(s.calls), static_cast<double>(s.pilot_calls))}};
+}
+
+Lines lines_of(const SplittingAnswer& answer) {
+  const markov::SplittingStudy& s = answer.passage;
+  Lines lines{{"expected steps before failure", estimate_text(s.steps)},
+              {"  from the metastable regime", estimate_text(markov::steps_from_quasi_stationary(s))},
+              {"status", "by splitting: the rounds agree"}};
+  if (!answer.no_mesh.empty()) lines.emplace_back("no mesh", answer.no_mesh);
+  lines.emplace_back("failure rate per step", estimate_text(s.failure_rate));
+  lines.emplace_back("mixing", fmt::format("{:.3g} steps", s.mixing_steps));
+  for (auto& line : effort_lines(s)) lines.push_back(std::move(line));
+  return lines;
+}
+
+std::string joined(const Lines& lines) {
+  std::string text;
+  for (const auto& [name, what] : lines) text += fmt::format("  {:<38}{}\n", name, what);
+  return text;
+}
+
+}  // namespace
+
+std::string splitting_json(const SplittingAnswer& answer, const Provenance& provenance) {
+  Json json = {{"setting", answer.name}, {"method", "splitting"}, {"status", "rounds_agree"}};
+  json["no_mesh"] = answer.no_mesh.empty() ? Json(nullptr) : Json(answer.no_mesh);
+  json.update(study_json(answer.passage));
+  json["provenance"] = {{"command", provenance.command},
+                        {"settings", provenance.settings},
+                        {"seed", provenance.seed},
+                        {"version", provenance.version}};
+  return json.dump(2) + "\n";
+}
+
+std::string splitting_text(const SplittingAnswer& answer) { return answer.name + "\n\n" + joined(lines_of(answer)); }
+
+Table splitting_table(const SplittingAnswer& answer, const Provenance& provenance) {
+  Table table{.id = "steps", .title = answer.name, .columns = {{"quantity"}, {"value"}}, .provenance = provenance};
+  for (const auto& [what, value] : lines_of(answer)) table.rows.push_back({what, value});
+  return table;
+}
+
+std::string with_splitting_json(const std::string& mesh_json, const markov::SplittingStudy& study) {
+  Json json = Json::parse(mesh_json);
+  json["splitting"] = study_json(study);
+  return json.dump(2) + "\n";
+}
+
+std::string with_splitting_text(const std::string& mesh_text, const markov::SplittingStudy& study) {
+  Lines lines{{"expected steps before failure", estimate_text(study.steps)},
+              {"  from the metastable regime", estimate_text(markov::steps_from_quasi_stationary(study))}};
+  for (auto& line : effort_lines(study)) lines.push_back(std::move(line));
+  return mesh_text + "\nBeside it, by splitting (agreed: within the joint interval)\n" + joined(lines);
+}
+
+}  // namespace metastable::reports
