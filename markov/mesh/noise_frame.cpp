@@ -154,7 +154,7 @@ std::vector<NoiseFrame> noise_frames(const BatchMap& map, std::span<const double
 NoiseFreeOrbit noise_free_orbit(const BatchMap& map, std::span<const double> start) {
   require_start(map, start);
   if (map.dimension > most_mesh_dimensions)
-    throw std::invalid_argument(
+    throw TooManyDimensions(
         fmt::format("return map: {} dimensions, where meshes hold 1 to {}; --method splitting takes up to {}",
                     map.dimension, most_mesh_dimensions, most_dimensions));
   if (map.scores == 0)

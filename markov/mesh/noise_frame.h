@@ -24,13 +24,20 @@ class NoOrbit : public MapError {
   using MapError::MapError;
 };
 
+/// Says that a map has more dimensions than meshes hold.
+class TooManyDimensions : public std::invalid_argument {
+ public:
+  using std::invalid_argument::invalid_argument;
+};
+
 /// Finds the noise-free orbit by following the map from `start` at phase 0, its derivatives by central differences, and
 /// from them the stationary covariance of the linear response, S' = A S A^T + B B^T, phase by phase. Axes are the
 /// eigenvectors of its correlations. Where the map jumps in a score, so that the derivative is more than three times
 /// the change from -1 to 1 sd, that change counts. An axis narrower than 0.05 of the widest counts as that wide: bent
 /// landings would fill it with nodes that tell nothing (a compass on facets takes twelve times fewer).
 /// @throws NoOrbit when the map fails without noise or right beside that, does not settle, or is unstable, naming the
-/// state; MapError as checked_step does, and when the noise does not move every number of the state
+/// state; MapError as checked_step does, and when the noise does not move every number of the state;
+/// TooManyDimensions
 std::vector<NoiseFrame> noise_frames(const BatchMap& map, std::span<const double> start);
 
 /// Holds the noise-free orbit, by the frames around it, and how what is beside it comes back.

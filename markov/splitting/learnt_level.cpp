@@ -77,11 +77,58 @@ class Anchors {
   std::vector<float> place_;
 };
 
+/// A logarithm of a chance, 0 at most, as a quadratic form of a state's coordinates; beyond twelve dimensions without
+/// products of different ones.
+class QuadraticForm {
+ public:
+  /// Fits values at places (rows of `dimension` numbers) by least squares, slightly damped.
+  QuadraticForm(std::size_t dimension, std::span<const float> places, std::span<const float> values) : d_(dimension) {
+    const auto n = static_cast<Index>(values.size());
+    VectorXd row = terms(places.first(d_));
+    MatrixXd gram = MatrixXd::Zero(row.size(), row.size());
+    VectorXd right = VectorXd::Zero(row.size());
+    for (Index i = 0; i < n; ++i) {
+      row = terms(places.subspan(static_cast<std::size_t>(i) * d_, d_));
+      gram.selfadjointView<Eigen::Lower>().rankUpdate(row);
+      right += static_cast<double>(values[static_cast<std::size_t>(i)]) * row;
+    }
+    gram.diagonal().array() += 1e-3 * static_cast<double>(n);
+    factors_ = solve_symmetric(gram, right);
+  }
+  double operator()(std::span<const float> at) const { return std::min(0.0, factors_.dot(terms(at))); }
+
+ private:
+  static constexpr std::size_t most_products = 12;
+  VectorXd terms(std::span<const float> at) const {
+    const bool all = d_ <= most_products;
+    VectorXd row(static_cast<Index>(all ? 1 + d_ + d_ * (d_ + 1) / 2 : 1 + 2 * d_));
+    Index k = 0;
+    row[k++] = 1;
+    for (std::size_t i = 0; i < d_; ++i) {
+      row[k++] = static_cast<double>(at[i]);
+      for (std::size_t j = i; j < (all ? d_ : i + 1); ++j)
+        row[k++] = static_cast<double>(at[i]) * static_cast<double>(at[j]);
+    }
+    return row;
+  }
+  std::size_t d_;
+  VectorXd factors_;
+};
+
 /// Holds what is learnt, for a level function to read.
 struct Learnt {
   std::vector<VisitFrame> frames;
   std::vector<Anchors> anchors;             ///< phase by phase
   std::vector<std::vector<float>> chances;  ///< their logarithms
+  std::vector<QuadraticForm> forms;         ///< phase by phase; none: what is between the nearest anchors counts
+
+  double between(std::size_t phase, std::span<const float> here, std::vector<float>& far) const {
+    const Anchors::Neighbours near = anchors[phase].nearest(here, far);
+    double sum = 0;
+    for (std::size_t b = 0; b < near.count; ++b)
+      sum += static_cast<double>(near.share[b]) * static_cast<double>(chances[phase][near.which[b]]);
+    return sum;
+  }
 };
 
 }  // namespace
@@ -194,106 +241,165 @@ struct Landings {
   std::vector<double> weight;
   std::vector<std::uint32_t> from;
   std::vector<Anchors::Neighbours> to;
+  std::vector<float> places;  ///< coordinates, row by row
+};
+
+class Learner {
+ public:
+  Learner(const BatchMap& map, const LearningOptions& options)
+      : map_(map),
+        options_(options),
+        d_(static_cast<std::size_t>(map.dimension)),
+        phases_(static_cast<std::size_t>(map.phases)),
+        learnt_(std::make_shared<Learnt>()),
+        states_(phases_),
+        rows_(phases_),
+        chance_(phases_) {}
+
+  LearntLevel learn(const std::vector<VisitFrame>& frames, const Visits& visits,
+                    const std::vector<std::vector<double>>& edges) {
+    learnt_->frames = frames;
+    for (std::size_t p = 0; p < phases_; ++p) choose(p, visits.phases[p], edges[p]);
+    for (std::size_t p = 0; p < phases_; ++p) land(p);
+    follow_chain();
+    take_logarithms();
+    if (map_.dimension > most_mesh_dimensions) fit();
+    answer_.level = [learnt = learnt_, d = d_](int phase, auto from, auto levels) {
+      const auto p = static_cast<std::size_t>(phase);
+      std::vector<float> here(d), far;
+      for (std::size_t i = 0; i < levels.size(); ++i) {
+        learnt->frames[p].place(from.subspan(i * d, d), here);
+        levels[i] = learnt->forms.empty() ? learnt->between(p, here, far) : learnt->forms[p](here);
+      }
+    };
+    return std::move(answer_);
+  }
+
+ private:
+  void choose(std::size_t p, const Visits::Phase& visits, const std::vector<double>& edges) {
+    const auto chosen =
+        choose_anchors(visits, edges, std::max<std::size_t>(options_.anchors / phases_, 60), options_, p);
+    std::vector<float> at(d_);
+    learnt_->anchors.emplace_back(d_, chosen.size());
+    for (std::size_t i = 0; i < chosen.size(); ++i) {
+      const auto state = std::span(visits.states).subspan(chosen[i] * d_, d_);
+      states_[p].insert(states_[p].end(), state.begin(), state.end());
+      learnt_->frames[p].place(state, at);
+      learnt_->anchors[p].put(i, at);
+      own_.resize(phases_);
+      own_[p].insert(own_[p].end(), at.begin(), at.end());
+    }
+  }
+
+  /// Lands the anchors of a phase.
+  void land(std::size_t p) {
+    const auto s = static_cast<std::size_t>(map_.scores);
+    const std::size_t n = learnt_->anchors[p].size(), to = (p + 1) % phases_, m = n * landings;
+    std::vector<double> from, scores(m * s), next(m * d_), weight(m, 1.0 / landings);
+    std::vector<std::uint64_t> words(m);
+    std::vector<std::uint8_t> failed(m, 0);
+    const std::uint64_t stream = landing_stream + (options_.stream << 16);
+    for (std::size_t i = 0; i < m; ++i) {
+      from.insert(from.end(), &states_[p][i / landings * d_], &states_[p][i / landings * d_] + d_);
+      words[i] = random_words(options_.seed, stream, i, p)[0];
+    }
+    for (std::size_t i = 0; s > 0 && i < m; i += landings) {
+      const auto weights = std::span(weight).subspan(i, landings);
+      stratified_scores(options_.seed, stream, i * phases_ + p, std::span(scores).subspan(i * s, landings * s),
+                        weights);
+      for (double& one : weights) one /= landings;
+    }
+    if (s > 0)
+      checked_step(map_, static_cast<int>(p), from, scores, next, failed);
+    else
+      checked_draw(map_, static_cast<int>(p), from, words, next, failed);
+    answer_.calls += m;
+    Landings& rows = rows_[p];
+    rows.fail.assign(n, 0);
+    std::vector<float> at(d_), distance;
+    for (std::size_t i = 0; i < m; ++i) {
+      if (failed[i]) {
+        rows.fail[i / landings] += weight[i];
+        continue;
+      }
+      learnt_->frames[to].place(std::span(next).subspan(i * d_, d_), at);
+      rows.from.push_back(static_cast<std::uint32_t>(i / landings));
+      rows.weight.push_back(weight[i]);
+      rows.to.push_back(learnt_->anchors[to].nearest(at, distance));
+      rows.places.insert(rows.places.end(), at.begin(), at.end());
+    }
+  }
+
+  /// Finds the chance within a window from the chain among the anchors.
+  void follow_chain() {
+    for (std::size_t p = 0; p < phases_; ++p) chance_[p].assign(learnt_->anchors[p].size(), 0);
+    const int window = (options_.window + map_.phases - 1) / map_.phases;
+    bool reached = false;  // failure, from every anchor
+    int taken = 0;
+    for (; taken < window || (!reached && taken < longest_window * window); ++taken) {
+      for (std::size_t p = phases_; p-- > 0;) {
+        const std::vector<double>& after = chance_[(p + 1) % phases_];
+        std::vector<double> now = rows_[p].fail;
+        for (std::size_t j = 0; j < rows_[p].from.size(); ++j) {
+          const Anchors::Neighbours& to = rows_[p].to[j];
+          double sum = 0;
+          for (std::size_t b = 0; b < to.count; ++b) sum += static_cast<double>(to.share[b]) * after[to.which[b]];
+          now[rows_[p].from[j]] += rows_[p].weight[j] * sum;
+        }
+        for (double& one : now) one = std::min(one, 1.0);
+        chance_[p] = std::move(now);
+      }
+      reached =
+          std::ranges::all_of(chance_, [](const auto& at_phase) { return *std::ranges::min_element(at_phase) > 0; });
+    }
+    answer_.window = taken * map_.phases;
+  }
+
+  void take_logarithms() {
+    for (const std::vector<double>& at_phase : chance_) {
+      double least = 1;
+      for (const double one : at_phase)
+        if (one > 0) least = std::min(least, one);
+      std::vector<float>& logs = learnt_->chances.emplace_back();
+      for (const double one : at_phase) logs.push_back(static_cast<float>(std::log(one > 0 ? one : 0.1 * least)));
+    }
+  }
+
+  /// Fits quadratic forms to the logarithms of the chances, and lets them take the place of the nearest anchors: the
+  /// chance is followed over a window more, each time fitted to what the forms say of the landings.
+  void fit() {
+    for (std::size_t p = 0; p < phases_; ++p)
+      learnt_->forms.emplace_back(d_, own_[p], std::span<const float>(learnt_->chances[p]));
+    const int sweeps = answer_.window / map_.phases;
+    for (int k = 0; k < sweeps; ++k)
+      for (std::size_t p = phases_; p-- > 0;) {
+        const Landings& rows = rows_[p];
+        const QuadraticForm& after = learnt_->forms[(p + 1) % phases_];
+        std::vector<double> now = rows.fail;
+        for (std::size_t j = 0; j < rows.from.size(); ++j)
+          now[rows.from[j]] += rows.weight[j] * std::exp(after(std::span(rows.places).subspan(j * d_, d_)));
+        std::vector<float> logs;
+        for (const double one : now) logs.push_back(static_cast<float>(std::log(std::clamp(one, 1e-30, 1.0))));
+        learnt_->forms[p] = QuadraticForm(d_, own_[p], logs);
+      }
+  }
+
+  const BatchMap& map_;
+  const LearningOptions& options_;
+  std::size_t d_, phases_;
+  std::shared_ptr<Learnt> learnt_;
+  std::vector<std::vector<double>> states_;  ///< of the anchors, phase by phase
+  std::vector<std::vector<float>> own_;      ///< and their coordinates, row by row
+  std::vector<Landings> rows_;
+  std::vector<std::vector<double>> chance_;
+  LearntLevel answer_;
 };
 
 }  // namespace
 
 LearntLevel learn_level(const BatchMap& map, const std::vector<VisitFrame>& frames, const Visits& visits,
                         const std::vector<std::vector<double>>& edges, const LearningOptions& options) {
-  const auto d = static_cast<std::size_t>(map.dimension), phases = static_cast<std::size_t>(map.phases),
-             s = static_cast<std::size_t>(map.scores);
-  auto learnt = std::make_shared<Learnt>();
-  learnt->frames = frames;
-  std::vector<std::vector<double>> states(phases);
-  std::vector<float> at(d), distance;
-  for (std::size_t p = 0; p < phases; ++p) {
-    const auto chosen =
-        choose_anchors(visits.phases[p], edges[p], std::max<std::size_t>(options.anchors / phases, 60), options, p);
-    learnt->anchors.emplace_back(d, chosen.size());
-    for (std::size_t i = 0; i < chosen.size(); ++i) {
-      const auto state = std::span(visits.phases[p].states).subspan(chosen[i] * d, d);
-      states[p].insert(states[p].end(), state.begin(), state.end());
-      frames[p].place(state, at);
-      learnt->anchors[p].put(i, at);
-    }
-  }
-  LearntLevel answer;
-  std::vector<Landings> rows(phases);
-  for (std::size_t p = 0; p < phases; ++p) {
-    const std::size_t n = learnt->anchors[p].size(), to = (p + 1) % phases, m = n * landings;
-    std::vector<double> from, scores(m * s), next(m * d), weight(m, 1.0 / landings);
-    const std::uint64_t stream = landing_stream + (options.stream << 16);
-    std::vector<std::uint64_t> words(m);
-    std::vector<std::uint8_t> failed(m, 0);
-    for (std::size_t i = 0; i < m; ++i) {
-      from.insert(from.end(), &states[p][i / landings * d], &states[p][i / landings * d] + d);
-      words[i] = random_words(options.seed, stream, i, p)[0];
-    }
-    if (s > 0)
-      for (std::size_t i = 0; i < m; i += landings) {
-        const auto weights = std::span(weight).subspan(i, landings);
-        stratified_scores(options.seed, stream, i * phases + p, std::span(scores).subspan(i * s, landings * s),
-                          weights);
-        for (double& one : weights) one /= landings;
-      }
-    if (s > 0)
-      checked_step(map, static_cast<int>(p), from, scores, next, failed);
-    else
-      checked_draw(map, static_cast<int>(p), from, words, next, failed);
-    answer.calls += m;
-    rows[p].fail.assign(n, 0);
-    for (std::size_t i = 0; i < m; ++i) {
-      if (failed[i]) {
-        rows[p].fail[i / landings] += weight[i];
-        continue;
-      }
-      frames[to].place(std::span(next).subspan(i * d, d), at);
-      rows[p].from.push_back(static_cast<std::uint32_t>(i / landings));
-      rows[p].weight.push_back(weight[i]);
-      rows[p].to.push_back(learnt->anchors[to].nearest(at, distance));
-    }
-  }
-  std::vector<std::vector<double>> chance(phases);
-  for (std::size_t p = 0; p < phases; ++p) chance[p].assign(learnt->anchors[p].size(), 0);
-  const int window = (options.window + map.phases - 1) / map.phases;
-  bool reached = false;  // failure, from every anchor
-  int taken = 0;
-  for (; taken < window || (!reached && taken < longest_window * window); ++taken) {
-    for (std::size_t p = phases; p-- > 0;) {
-      const std::vector<double>& after = chance[(p + 1) % phases];
-      std::vector<double> now = rows[p].fail;
-      for (std::size_t j = 0; j < rows[p].from.size(); ++j) {
-        const Anchors::Neighbours& to = rows[p].to[j];
-        double sum = 0;
-        for (std::size_t b = 0; b < to.count; ++b) sum += static_cast<double>(to.share[b]) * after[to.which[b]];
-        now[rows[p].from[j]] += rows[p].weight[j] * sum;
-      }
-      for (double& one : now) one = std::min(one, 1.0);
-      chance[p] = std::move(now);
-    }
-    reached = std::ranges::all_of(chance, [](const auto& at_phase) { return *std::ranges::min_element(at_phase) > 0; });
-  }
-  answer.window = taken * map.phases;
-  for (const std::vector<double>& at_phase : chance) {
-    double least = 1;
-    for (const double one : at_phase)
-      if (one > 0) least = std::min(least, one);
-    std::vector<float>& logs = learnt->chances.emplace_back();
-    for (const double one : at_phase) logs.push_back(static_cast<float>(std::log(one > 0 ? one : 0.1 * least)));
-  }
-  answer.level = [learnt, d](int phase, auto from, auto levels) {
-    const auto p = static_cast<std::size_t>(phase);
-    std::vector<float> here(d), far;
-    for (std::size_t i = 0; i < levels.size(); ++i) {
-      learnt->frames[p].place(from.subspan(i * d, d), here);
-      const Anchors::Neighbours near = learnt->anchors[p].nearest(here, far);
-      double sum = 0;
-      for (std::size_t b = 0; b < near.count; ++b)
-        sum += static_cast<double>(near.share[b]) * static_cast<double>(learnt->chances[p][near.which[b]]);
-      levels[i] = sum;
-    }
-  };
-  return answer;
+  return Learner(map, options).learn(frames, visits, edges);
 }
 
 }  // namespace metastable::markov

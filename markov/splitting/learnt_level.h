@@ -50,7 +50,8 @@ struct LearntLevel {
 
 /// Takes anchors among the visits, evenly over levels, lands each under several draws of the noise, and finds the
 /// chance of failing from the chain among the anchors: a landing is shared among the nearest ones, nearer ones getting
-/// more. It is coarse, and only a guide: what an ensemble finds does not hang on it, how surely does.
+/// more. In more than four dimensions the nearest are far; quadratic forms fitted to the logarithm then take their
+/// place. It is coarse, and only a guide: what an ensemble finds does not hang on it, how surely does.
 LearntLevel learn_level(const BatchMap& map, const std::vector<VisitFrame>& frames, const Visits& visits,
                         const std::vector<std::vector<double>>& edges, const LearningOptions& options);
 

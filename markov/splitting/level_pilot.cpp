@@ -20,8 +20,7 @@ namespace {
 constexpr int refinements = 3;
 constexpr std::uint64_t enough_failures = 50;  // replicas
 constexpr double shortest_spread = 30;         // [steps]
-constexpr double left_of_memory = 0.05;
-constexpr std::size_t kept_times = 60;  // steps of which visits are kept
+constexpr std::size_t kept_times = 60;         // steps of which visits are kept
 constexpr std::uint64_t pairs_stream = 0xa000;
 
 class Pilot {

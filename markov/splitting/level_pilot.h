@@ -10,6 +10,9 @@
 
 namespace metastable::markov {
 
+/// What is left of the memory of a state after the time that counts as mixing.
+inline constexpr double left_of_memory = 0.05;
+
 struct PilotOptions {
   LevelFunction level = {};  ///< to split by; empty: the distance from what is visited, then what is learnt
   std::size_t replicas = 1000;
@@ -20,7 +23,8 @@ struct PilotOptions {
 
 struct LevelPilot {
   Levels levels;
-  double mixing_steps = 0;   ///< after which 0.05 is left of what is remembered of a state, by linear regression
+  double mixing_steps =
+      0;  ///< after which left_of_memory is left of what is remembered of a state, by linear regression
   std::uint64_t window = 0;  ///< in which failures that begin in the middle come about [steps]
   std::uint64_t calls = 0;
 };

@@ -173,7 +173,7 @@ class Study {
     found_.rounds = options_.rounds;
     found_.round_steps = burn_in_ + rounds_.front().shares.size();
     found_.calls = calls_;
-    found_.mixing_steps = mixing_;
+    found_.mixing_steps = mixing_ / -std::log(left_of_memory);
     const Pooled all = pooled(rounds_.size(), &found_.survival);
     std::vector<double> steps, rates;
     found_.rates.clear();
@@ -277,13 +277,18 @@ void require_agreement(const MeshStudy& mesh, const SplittingStudy& splitting, c
 
 SplittingStudy splitting_study(const BatchMap& map, std::span<const double> start, const SplittingOptions& options) {
   require_start(map, start);
+  if (!(options.tolerance > 0))
+    throw std::invalid_argument(fmt::format("splitting: a tolerance of {}, above 0 expected", options.tolerance));
+  if (options.replicas == 0) {
+    SplittingOptions chosen = options;
+    chosen.replicas = static_cast<std::size_t>(std::clamp(50 / options.tolerance, 200.0, 1000.0));
+    return splitting_study(map, start, chosen);
+  }
   if (options.replicas < 100)
     throw std::invalid_argument(fmt::format("splitting: {} replicas, 100 or more expected", options.replicas));
   if (options.pilots < 1 || options.rounds < 8 || options.rounds % options.pilots != 0)
     throw std::invalid_argument(fmt::format("splitting: {} rounds, 8 or more and a multiple of the {} pilots expected",
                                             options.rounds, options.pilots));
-  if (!(options.tolerance > 0))
-    throw std::invalid_argument(fmt::format("splitting: a tolerance of {}, above 0 expected", options.tolerance));
   return Study(map, start, options).run();
 }
 

@@ -14,11 +14,11 @@
 namespace metastable::markov {
 
 struct SplittingOptions {
-  LevelFunction level = {};              ///< that ensembles are split by; empty: learnt
-  std::size_t replicas = 1000;           ///< of one ensemble, >= 100
-  int rounds = 16;                       ///< independent ensembles, >= 8, a multiple of the pilots
-  int pilots = 4;                        ///< that each learn a level of their own, >= 1
-  double tolerance = 0.05;               ///< wanted half-width of the 95 % interval of ln steps, > 0
+  LevelFunction level = {};  ///< that ensembles are split by; empty: learnt
+  std::size_t replicas = 0;  ///< of one ensemble, >= 100; 0: 1000, of a tolerance above 0.05 50 / tolerance, >= 200
+  int rounds = 16;           ///< independent ensembles, >= 8, a multiple of the pilots
+  int pilots = 4;            ///< that each learn a level of their own, >= 1
+  double tolerance = 0.05;   ///< wanted half-width of the 95 % interval of ln steps, > 0
   std::uint64_t most_calls = 400000000;  ///< rows that the map is asked for, in all
   std::uint64_t seed = 1;
   int threads = 0;  ///< 0: all cores; the bits do not depend on it
@@ -30,7 +30,7 @@ struct SplittingOptions {
 struct SplittingStudy {
   MeshEstimate steps;            ///< expected steps before failure from the start
   MeshEstimate failure_rate;     ///< a step, from the quasi-stationary distribution
-  double mixing_steps = 0;       ///< after which 0.05 of what is remembered of a state is left, to first order
+  double mixing_steps = 0;       ///< e-folding of what is remembered of a state, by linear regression
   std::vector<double> survival;  ///< [k]: share that walks on after k + 1 steps; beyond the last at the failure rate
   int rounds = 0;
   std::uint64_t round_steps = 0;  ///< that each took

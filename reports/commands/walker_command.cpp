@@ -8,6 +8,7 @@
 
 #include "analysis/walker_model/walk_folder.h"
 #include "analysis/walkers/walker_falls.h"
+#include "markov/mesh/noise_frame.h"
 #include "reports/commands/sweep_file.h"
 #include "reports/output/interrupt.h"
 #include "reports/output/output_file.h"
@@ -52,7 +53,9 @@ std::optional<SplittingAnswer> ask_both_ways(WalkerMethod method, const std::str
       answer.no_mesh = error.what();
     } catch (const markov::MapError& error) {
       answer.no_mesh = error.what();
-    } catch (const std::length_error& error) {
+    } catch (const markov::TooManyDimensions& error) {
+      answer.no_mesh = error.what();
+    } catch (const std::length_error& error) {  // too much memory
       answer.no_mesh = error.what();
     }
   if (method == WalkerMethod::mesh) return std::nullopt;

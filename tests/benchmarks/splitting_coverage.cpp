@@ -8,9 +8,11 @@
 #include <cstdio>
 #include <cstdlib>
 #include <ctime>
+#include <optional>
 #include <string>
 #include <vector>
 
+#include "analysis/study/setting.h"
 #include "analysis/walkers/walker_study.h"
 #include "markov/normal_95.h"
 #include "markov/splitting/splitting_study.h"
@@ -54,6 +56,26 @@ Tried many(int d, double threshold, double steps) {
   return tried;
 }
 
+/// Takes the paper's wheel on 9.59 deg from 5.83 rad/s, by the law `published`; its state is omega^2, its phases legs.
+Tried wheel(double friction_mean, double friction_sd, double steps, double error) {
+  analysis::Setting setting;
+  setting.slope_deg = 9.59;
+  setting.friction = {friction_mean, friction_sd};
+  const markov::AnyReturnMap wheel = setting.problem().map;
+  Tried tried{fmt::format("wheel, friction {} +- {}", friction_mean, friction_sd), {}, {5.83 * 5.83}, steps, error};
+  tried.map.scores = wheel.noise_dimension();
+  tried.map.phases = wheel.phases();
+  tried.map.step = [wheel](int phase, auto states, auto scores, auto next, auto failed) {
+    const std::size_t s = scores.size() / failed.size();
+    for (std::size_t i = 0; i < failed.size(); ++i) {
+      const std::optional<double> landing = wheel.landing(states[i], phase, scores.subspan(i * s, s));
+      failed[i] = !landing;
+      if (landing) next[i] = *landing;
+    }
+  };
+  return tried;
+}
+
 std::vector<Tried> settings() {
   using namespace markov::testing;
   using analysis::Walker;
@@ -69,6 +91,9 @@ std::vector<Tried> settings() {
   all.push_back(walker("facets, 132.4", Walker::compass, 0.0035 / analysis::degree, Terrain::facets, 132.0, 0.0083));
   // The product of the survivals of eight lines, each by Nystrom's method on 400 Gauss-Legendre nodes.
   all.push_back(many(8, 4.5, 37557.2));
+  // metastable steps --law published --slope 9.59 --friction 0.3,0.05 and 0.32,0.03
+  all.push_back(wheel(0.3, 0.05, 44800, 0.002));
+  all.push_back(wheel(0.32, 0.03, 1.39e9, 0.007));
   return all;
 }
 

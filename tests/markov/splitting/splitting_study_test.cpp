@@ -70,7 +70,7 @@ TEST(SplittingStudy, TakesEightDimensions) {
   std::vector<double> start(8, -0.5);
   start[0] = 1.5;
   expect_near(splitting_study(eight_batch(0.6), start, quick), linear_steps(0.6, 2));
-  EXPECT_THROW(mesh_study(eight_batch(0.6), start), std::invalid_argument);
+  EXPECT_THROW(mesh_study(eight_batch(0.6), start), TooManyDimensions);
 }
 
 TEST(SplittingStudy, IsTheSameOnAnyNumberOfThreads) {

@@ -42,6 +42,23 @@ TEST_F(WalkerCommand, StepsSaysWhatStandsBehindThem) {
             json["how_it_fails"]["regime"]["bound_to_fail"].get<double>());
 }
 
+TEST_F(WalkerCommand, SplittingAgreesWithTheMesh) {
+  const Ran alone = metastable(
+      walker("steps", {"--method", "splitting", "--tolerance", "0.25", "--threads", "1", "--json", path("s.json")}));
+  ASSERT_EQ(alone.code, 0) << alone.err;
+  for (const char* said : {"by splitting: the rounds agree", "independent lines to failure", "steps of the map"})
+    EXPECT_NE(alone.out.find(said), std::string::npos) << said << '\n' << alone.out;
+  const auto json = nlohmann::json::parse(read(path("s.json")));
+  EXPECT_EQ(json["status"], "rounds_agree");
+  const Ran both = metastable(walker("steps", {"--method", "auto", "--spacing", "0.9", "--simulated-steps", "50000",
+                                               "--tolerance", "0.25", "--json", path("b.json")}));
+  ASSERT_EQ(both.code, 0) << both.err;
+  EXPECT_NE(both.out.find("Beside it, by splitting"), std::string::npos) << both.out;
+  const auto beside = nlohmann::json::parse(read(path("b.json")));
+  EXPECT_EQ(beside["splitting"]["expected_steps"], json["expected_steps"]);
+  EXPECT_EQ(beside["status"], "agreed");
+}
+
 TEST_F(WalkerCommand, SimulateWritesEveryStep) {
   const Ran ran = metastable(walker("simulate", {"--trials", "5", "--out", path("walks")}));
   ASSERT_EQ(ran.code, 0) << ran.err;

@@ -95,7 +95,7 @@ class Steps(unittest.TestCase):
                 line(step).study(progress=False)
         with self.assertRaises(KeyboardInterrupt):
             line(self.interrupting).study()
-        for fields, sentence in ((dict(dimension=5), r"dimension: 5 is outside 1\.\.4"),
+        for fields, sentence in ((dict(dimension=31), r"dimension: 31 is outside 1\.\.30"),
                                  (dict(noise=0), r"noise: 0 is outside 1\.\.16"),
                                  (dict(start=[0, 0]), "a start of 1 numbers expected"),
                                  (dict(names=["a", "b"]), "one name for each dimension"),
@@ -113,6 +113,26 @@ class Steps(unittest.TestCase):
         with self.assertRaisesRegex(metastable.Contradiction, r"a line: the mesh \(4\.92.* walks failed within \d+ steps, "
                                     "where the mesh foretells .*disagree: no number is given"):
             line(band).study(simulated_steps=100000)
+
+    def test_of_six_dimensions_are_split(self):
+        kept = np.linspace(0.3, 0.8, 6)
+
+        def six(state, noise):  # 1140.3 steps: the product of the survivals of six lines, by Nystrom's method
+            following = kept * state + np.sqrt(1 - kept ** 2) * noise
+            return following, (following > 3.6).any(axis=1)
+
+        walker = metastable.walker(six, 6, 6, start=[0] * 6)
+        with self.assertRaisesRegex(metastable.InputError, "6 dimensions, where meshes hold 1 to 4; method splitting"):
+            walker.study()
+        for method in ("splitting", "auto"):
+            study = walker.study(method=method, tolerance=0.3)
+            low, high = study.expected_steps.interval_95
+            self.assertLess(abs(np.log(study.expected_steps.value / 1140.3)), np.log(high / low))
+            self.assertEqual(study.status, "rounds_agree")
+            self.assertEqual(study.survival[0], 1)
+        self.assertIn("meshes hold 1 to 4", study.no_mesh)
+        with self.assertRaisesRegex(metastable.InputError, "spacing: has no meaning under method splitting"):
+            walker.study(method="splitting", spacing=1)
 
     def test_slips_to_another_gait_count(self):
         def gaits(state, noise):  # 7.207e5 steps by elimination of fine cells
