@@ -88,7 +88,7 @@ TEST(BatchMap, ThatDrawsForItselfIsSimulatedOnlyAndToldSo) {
     }
   };
   const std::vector<double> start{0};
-  EXPECT_NE(message_of<MapError>([&] { mesh_study(map, start); }).find("simulated only"), std::string::npos);
+  EXPECT_NE(message_of<MapError>([&] { mesh_study(map, start); }).find("simulated and split only"), std::string::npos);
   const auto simulated = simulate_steps(map, start, {.trials = 20000});
   ASSERT_TRUE(simulated);
   EXPECT_NEAR(simulated->mean, 10, 4 * simulated->standard_error);
