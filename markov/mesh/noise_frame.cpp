@@ -159,7 +159,8 @@ NoiseFreeOrbit noise_free_orbit(const BatchMap& map, std::span<const double> sta
                     map.dimension, most_mesh_dimensions, most_dimensions));
   if (map.scores == 0)
     throw MapError(
-        "return map: it draws for itself, so the tails of its noise cannot be weighted; it can be simulated and split only");
+        "return map: it draws for itself, so the tails of its noise cannot be weighted; it can be simulated and split "
+        "only");
   const Probe probe(map);
   const std::vector<VectorXd> orbit = settled_orbit(map, probe, start);
   std::vector<MatrixXd> a, q;

@@ -163,7 +163,7 @@ TEST_F(Refusals, OfWrongWordsHintAtTheNearest) {
        path("key.toml") + ":2: unknown key 'frictoin' (keys are the long options of 'metastable steps'); did you mean "
                           "'friction'?"},
       {{"steps", "--method", "integrate"},
-       "--method: 'integrate' is none of sampled, integrated; did you mean 'integrated'?"},
+       "--method: 'integrate' is none of sampled, integrated, mesh, splitting, auto; did you mean 'integrated'?"},
       {{"steps", "--sequence", "sobel"}, "--sequence: 'sobel' is none of sobol, random; did you mean 'sobol'?"},
       {{"steps", "--walker", "compass", "--slope-sd", "1", "--method", "sampled"},
        "--method: 'sampled' is none of mesh, splitting, auto, which walkers have"},
