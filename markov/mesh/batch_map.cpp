@@ -9,7 +9,8 @@ namespace metastable::markov {
 
 void require_map(const BatchMap& map) {
   if (map.dimension < 1 || map.dimension > most_dimensions)
-    throw std::invalid_argument(fmt::format("return map: {} dimensions, 1 to {} expected", map.dimension, most_dimensions));
+    throw std::invalid_argument(
+        fmt::format("return map: {} dimensions, 1 to {} expected", map.dimension, most_dimensions));
   if (map.phases < 1) throw std::invalid_argument(fmt::format("return map: {} phases, 1 or more expected", map.phases));
   if (map.scores < 0 || (map.scores > 0 && !map.step) || (map.scores == 0 && !map.draw))
     throw std::invalid_argument(

@@ -102,8 +102,9 @@ WalkerMethod walker_method(const Options& o) {
     return WalkerMethod::mesh;
   }
   const std::string name = o.text("method");
-  for (const auto& [known, method] : {std::pair("mesh", WalkerMethod::mesh),
-                                      std::pair("splitting", WalkerMethod::splitting), std::pair("auto", WalkerMethod::both)}) {
+  for (const auto& [known, method] :
+       {std::pair("mesh", WalkerMethod::mesh), std::pair("splitting", WalkerMethod::splitting),
+        std::pair("auto", WalkerMethod::both)}) {
     if (name != known) continue;
     const bool meshes = method != WalkerMethod::splitting;
     if (o.given("tolerance") && method == WalkerMethod::mesh)
@@ -113,8 +114,7 @@ WalkerMethod walker_method(const Options& o) {
         throw std::invalid_argument(fmt::format("--{}: has no meaning under --method splitting", own));
     return method;
   }
-  throw std::invalid_argument(
-      fmt::format("--method: '{}' is none of mesh, splitting, auto, which walkers have", name));
+  throw std::invalid_argument(fmt::format("--method: '{}' is none of mesh, splitting, auto, which walkers have", name));
 }
 
 markov::SplittingOptions splitting_options(const Options& o) {
