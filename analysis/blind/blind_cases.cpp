@@ -191,7 +191,9 @@ bool can_be_had(std::string_view effect, dynamics::Law law) {
   return true;
 }
 
-std::vector<BlindPlan> blind_plan(const BlindSize& size, std::uint64_t seed) {
+namespace {
+
+void require_size(const BlindSize& size) {
   for (const auto& [name, count] :
        {std::pair<std::string_view, int>{"per_effect_and_strength", size.per_effect_and_strength},
         {"none", size.none},
@@ -205,6 +207,12 @@ std::vector<BlindPlan> blind_plan(const BlindSize& size, std::uint64_t seed) {
   for (const dynamics::Law law : size.laws)
     if (law != dynamics::Law::published && law != dynamics::Law::settled)
       throw std::invalid_argument(fmt::format("laws: \"{}\" is none of published, settled", dynamics::law_name(law)));
+}
+
+}  // namespace
+
+std::vector<BlindPlan> blind_plan(const BlindSize& size, std::uint64_t seed) {
+  require_size(size);
   BlindDice dice(seed, 0);
   std::vector<BlindPlan> plan;
   std::map<BlindKind, std::size_t> turn;

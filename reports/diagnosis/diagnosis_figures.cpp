@@ -115,9 +115,6 @@ Figure map_figure(const std::vector<Row>& rows, const std::vector<std::string>& 
   return figure;
 }
 
-// Says whether the answer is of speeds at collisions; else it is of the columns of a machine.
-bool of_speeds(const Diagnosis& d) { return d.data.step_name != "step"; }
-
 // Draws the places where one aspect tells most. @param first  its first column of the rows
 std::optional<Figure> furthest_figure(std::vector<Row> rows, const std::vector<ModelMap>& models, std::size_t first,
                                       const std::string& id, std::string title, std::size_t least) {
@@ -164,7 +161,7 @@ std::vector<Figure> closes_figures(const Diagnosis& d) {
 }
 
 std::vector<Figure> return_map_figures(const Diagnosis& d) {
-  if (!d.model || of_speeds(d)) return {};
+  if (of_speeds(d)) return {};
   const auto simulated = d.model->simulate(analysis::nominal_values(*d.model), {}, 1);
   const auto columns = d.model->columns();
   std::vector<Figure> figures;

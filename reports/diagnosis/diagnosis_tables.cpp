@@ -296,8 +296,10 @@ Table steps_table(const Diagnosis& d) {
   return table;
 }
 
+bool of_speeds(const Diagnosis& d) { return !d.model || d.model->columns().front().name == "speed"; }
+
 Table profile_table(const Diagnosis& d) {
-  const bool speeds = d.data.step_name != "step";
+  const bool speeds = of_speeds(d);
   const std::string unit = speeds ? "rad/s" : "";
   Table table{.id = "profile",
               .title = speeds ? "Mean speed before a collision, measured and simulated"

@@ -20,6 +20,9 @@ std::vector<analysis::GapCell> beyond_chance(const analysis::GapMap& map);
 /// Returns the unit of an effect's parameter, "" for a ratio and for what the catalogue does not hold.
 std::string_view effect_unit(std::string_view effect, std::string_view parameter);
 
+/// Says whether the answer is of speeds; else it is of the columns of a machine, whose model it then holds.
+bool of_speeds(const analysis::Diagnosis& diagnosis);
+
 /// All come without provenance. A table of nothing has no rows.
 Table data_table(const analysis::Diagnosis& diagnosis);     ///< what was there; the notes below it
 Table gap_table(const analysis::Diagnosis& diagnosis);      ///< p-values

@@ -55,18 +55,22 @@ class Sections {
   std::string law_;
 };
 
-}  // namespace
-
-void write_diagnosis(const analysis::Diagnosis& d, const std::string& title, const std::string& law,
-                     const Provenance& provenance, const std::string& folder) {
-  PageFolder pages(folder);
-  Page& page = pages.page();
+void set_head(Page& page, const analysis::Diagnosis& d, const std::string& title) {
   page.title = fmt::format("{}Verdict: {}", title.empty() ? "" : title + ". ", analysis::verdict_name(d.verdict));
   if (!d.sentences.empty()) {
     page.lead = {d.sentences.front()};
     page.intro.assign(d.sentences.begin() + 1, d.sentences.end());
   }
   page.intro.push_back("Next: " + analysis::next_step(d));
+}
+
+}  // namespace
+
+void write_diagnosis(const analysis::Diagnosis& d, const std::string& title, const std::string& law,
+                     const Provenance& provenance, const std::string& folder) {
+  PageFolder pages(folder);
+  Page& page = pages.page();
+  set_head(page, d, title);
   page.provenance = provenance;
   Sections sections(pages, provenance, law);
   std::vector<Figure> answer = ranking_figures(d), shrinking = shrinkage_figures(d);
@@ -75,7 +79,7 @@ void write_diagnosis(const analysis::Diagnosis& d, const std::string& title, con
     shrinking.erase(shrinking.begin());
   }
   for (Figure& figure : closes_figures(d)) answer.push_back(std::move(figure));
-  const bool speeds = d.data.step_name != "step";
+  const bool speeds = of_speeds(d);
   const std::string values = speeds ? "speeds" : "values";
   sections.add(
       "which", "Which effect, and how much of the gap it closes",

@@ -103,6 +103,15 @@ TEST_F(WalkFolder, EffectsThatTheMachineLacksAreRefused) {
             std::string::npos);
 }
 
+TEST_F(WalkFolder, UnknownEffectsOfACatalogueHintAtTheNearest) {
+  write(drawn());
+  DiagnosisOptions options;
+  options.catalogue = {"leg_mas"};
+  const std::string message = message_of<std::invalid_argument>([&] { diagnose_walks(*read_walks(folder_), options); });
+  EXPECT_NE(message.find("catalogue: 'leg_mas' is none of hip_damping"), std::string::npos) << message;
+  EXPECT_NE(message.find("did you mean 'leg_mass'"), std::string::npos) << message;
+}
+
 // One leg has more mass: the diagnosis names it with its size.
 TEST_F(WalkFolder, OneHeavierLegIsNamed) {
   write(drawn({{"leg_mass.mass_ratio", 1.08}}, 12));
