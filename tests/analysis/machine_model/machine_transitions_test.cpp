@@ -9,6 +9,7 @@
 #include <string>
 
 #include "analysis/diagnosis/diagnosis.h"
+#include "dynamics/numerics/truncated_normal.h"
 #include "tests/analysis/machine_model/machines.h"
 
 namespace metastable::analysis::test {
@@ -59,6 +60,30 @@ INSTANTIATE_TEST_SUITE_P(MachineTransitions, WhatWasDone,
                          testing::Values(Done{"nothing", 0, 0, 0, 0}, Done{"bend", -0.05, 0, 0, -0.05},
                                          Done{"b_drift", 0, 0.3, 0, 0.3}, Done{"b_spread", 0, 0, 0.15, 0.15}),
                          [](const auto& instance) { return std::string(instance.param.cause); });
+
+// The machine fails where its noise is below an edge, whatever its state: in one step of so many.
+TEST(MachineTransitions, ExpectedStepsAreThoseOfItsChanceOfFailure) {
+  Machine machine = linear_machine(0.05);
+  machine.effects.clear();
+  machine.may_vary.clear();
+  machine.parameters = {{"edge", -2, 0.1}};
+  machine.step = [](const MachineBatch& batch) {
+    for (std::size_t i = 0; i < batch.rows; ++i) {
+      batch.next[i] = batch.states[i] / 2 + 1 + batch.scores[i] / 2;
+      batch.failed[i] = batch.scores[i] < batch.value(0, i);
+    }
+  };
+  MachineRuns runs =
+      scalar_runs(12, 10, 2.0, 0.05, 11, [](double x, double z, std::size_t) { return x / 2 + 1 + std::abs(z) / 2; });
+  runs.trials[0].outcome = MachineOutcome::failed;
+  const auto model = machine_transitions(std::make_shared<const Machine>(machine), runs);
+  for (const double edge : {-2.0, -3.5}) {
+    std::vector<double> nuisance = nominal_values(*model);
+    nuisance[0] = edge;
+    const double steps = 1 / dynamics::normal_cdf(edge);
+    EXPECT_NEAR(std::log(model->expected_steps(nuisance, {}, 1) / steps), 0, edge < -3 ? 0.5 : 0.25) << edge;
+  }
+}
 
 }  // namespace
 }  // namespace metastable::analysis::test
