@@ -10,7 +10,7 @@ set(ROOMS
   "markov/passage: markov markov/chain"
   "markov/transition_rows: markov markov/chain markov/passage"
   "markov/mesh: markov markov/chain markov/transition_rows"
-  "markov/splitting: markov markov/mesh markov/transition_rows"
+  "markov/splitting: markov markov/transition_rows markov/mesh"
   "markov/ranks: markov/chain markov/mesh"
   "dynamics/numerics:"
   "dynamics/catalogue:"
@@ -44,11 +44,11 @@ set(ROOMS
   "reports/diagnosis: dynamics/catalogue analysis/statistics analysis/diagnosis analysis/blind reports/output"
   "reports/study: markov/transition_rows dynamics/wheel analysis/statistics analysis/walkers analysis/study analysis/experiment analysis/paper analysis/sensitivity reports/output"
   "reports/import: analysis/experiment analysis/motion_capture reports/output"
-  "reports/commands: markov markov/passage markov/mesh markov/splitting dynamics/wheel analysis/statistics analysis/walkers analysis/diagnosis analysis/study analysis/experiment analysis/description analysis/walker_model analysis/blind analysis/motion_capture analysis/paper analysis/sensitivity reports/output reports/study reports/import"
+  "reports/commands: markov markov/passage markov/mesh dynamics/wheel analysis/statistics analysis/walkers analysis/diagnosis analysis/study analysis/experiment analysis/description analysis/walker_model analysis/blind analysis/motion_capture analysis/paper analysis/sensitivity reports/output reports/study reports/import"
   "reports/experiment_commands: markov dynamics/catalogue dynamics/wheel analysis/statistics analysis/diagnosis analysis/study analysis/experiment analysis/description analysis/walker_model analysis/experiment_model analysis/blind analysis/motion_capture analysis/paper reports/output reports/description reports/diagnosis reports/study reports/import reports/commands"
-  "reports/command_line: dynamics/catalogue dynamics/wheel analysis/study analysis/experiment analysis/wheel_model analysis/sensitivity reports/output reports/commands reports/experiment_commands"
+  "reports/command_line: dynamics/catalogue dynamics/wheel analysis/study analysis/experiment analysis/wheel_model analysis/walker_model analysis/sensitivity reports/output reports/commands reports/experiment_commands"
   "reports/ranks: markov/mesh markov/ranks analysis/walkers reports/output reports/commands reports/command_line"
-  "reports/python: markov markov/chain markov/passage markov/mesh markov/splitting analysis/walkers analysis/diagnosis analysis/study analysis/experiment analysis/machine_model analysis/walker_model analysis/experiment_model analysis/sensitivity reports/output reports/diagnosis reports/study reports/commands reports/experiment_commands reports/command_line")
+  "reports/python: markov markov/chain markov/passage markov/mesh analysis/walkers analysis/diagnosis analysis/study analysis/experiment analysis/machine_model analysis/walker_model analysis/experiment_model analysis/sensitivity reports/output reports/diagnosis reports/study reports/commands reports/experiment_commands reports/command_line")
 
 # Where less than a whole room may be seen: who (a pattern of files), which room, which of its headers.
 set(NARROW

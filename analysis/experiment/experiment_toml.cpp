@@ -276,6 +276,8 @@ void parse_experiment_toml(const std::string& file, std::string_view text, Exper
   Keys root(file, *table, "", defects);
   experiment.title = root.text("title", false).value_or("");
   if (const auto system = root.text("system", false)) {
+    if (*system == "machine")
+      return root.report(*root.find("system", true), "system: this is a folder of walks, which only diagnose reads");
     if (*system == "coast_down")
       experiment.system = System::coast_down;
     else if (*system != "rimless_wheel")

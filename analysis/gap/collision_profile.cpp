@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 
 #include "analysis/fitting/model_fit.h"
 #include "analysis/statistics/interval_95.h"
@@ -22,7 +23,7 @@ struct Sum {
     sum += speed;
     squares += speed * speed;
   }
-  double mean() const { return count > 0 ? sum / count : 0.0; }
+  double mean() const { return count > 0 ? sum / count : std::numeric_limits<double>::quiet_NaN(); }
   double sd() const {
     return count > 1 ? std::sqrt(std::max(0.0, squares / count - mean() * mean()) * count / (count - 1)) : 0;
   }

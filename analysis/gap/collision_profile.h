@@ -3,6 +3,7 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <limits>
 #include <vector>
 
 #include "analysis/fitting/transition_model.h"
@@ -17,8 +18,8 @@ struct ProfilePoint {
   int collision = 1;
   std::size_t trials = 0;
   double measured = 0, measured_error = 0;  ///< mean, standard error [rad/s]
-  double baseline = 0, with_effect = 0;     ///< simulated means [rad/s]
-  double band = 0;                          ///< half-width of the 95 % band of the mean of as many trials [rad/s]
+  /// Simulated means, and the half-width of the 95 % band of the mean of as many trials [rad/s]; NaN: none came so far.
+  double baseline = std::numeric_limits<double>::quiet_NaN(), with_effect = baseline, band = baseline;
 };
 
 /// Returns the mean speed before each collision by condition, up to the 40th, where three trials or more have one. The

@@ -23,6 +23,7 @@ namespace metastable::analysis {
 namespace {
 
 constexpr double angle_error = 0.0005, compass_rate_error = 0.005, simplest_rate_error = 0.001;
+constexpr double unknown_launch = 0.3;  // sd of a first value that is not measured, in those of the gait
 constexpr std::int64_t most_steps = 1'000'000'000;
 constexpr dynamics::Range angles{.low = 0, .high = 1.5707963267948966, .low_open = true, .high_open = true};
 constexpr dynamics::Range rates{.low = -1000, .high = 1000};
@@ -114,6 +115,10 @@ class WalkReader {
       }
       const std::string_view told = csv.text(2);
       std::optional<MachineOutcome>& outcome = runs_.trials[at->second].outcome;
+      if (outcome) {
+        csv.refuse(1, fmt::format("trial {} was there before", *trial));
+        continue;
+      }
       if (told == "failed")
         outcome = MachineOutcome::failed;
       else if (told == "stopped")
@@ -188,6 +193,8 @@ std::vector<double> values_with(const Machine& machine, const std::vector<std::p
   for (const auto& [name, value] : effects) {
     require_word("--effect", name, known);
     const auto at = static_cast<std::size_t>(std::ranges::find(known, name) - known.begin());
+    if (values[first + at] != of[at]->neutral)
+      throw std::invalid_argument(fmt::format("--effect: {} is given twice", name));
     if (!(value >= of[at]->lower && value <= of[at]->upper))
       throw std::invalid_argument(
           fmt::format("--effect: {}: {} is outside [{}, {}]", name, value, of[at]->lower, of[at]->upper));
@@ -198,6 +205,16 @@ std::vector<double> values_with(const Machine& machine, const std::vector<std::p
 }
 
 }  // namespace
+
+bool holds_walks(const std::filesystem::path& folder) {
+  try {
+    const ExperimentSource source = read_source(folder);
+    Defects defects;
+    return parse_walk_toml(source.folder, source.experiment_toml, defects).has_value();
+  } catch (const InputError&) {
+    return false;
+  }
+}
 
 std::optional<Walks> read_walks(const std::filesystem::path& folder) {
   const ExperimentSource source = read_source(folder);
@@ -216,6 +233,12 @@ std::optional<Walks> read_walks(const std::filesystem::path& folder) {
   auto machine = std::make_shared<Machine>(walker_machine(statement));
   for (const WalkDescription::Column& column : told->columns)
     machine->observe.push_back({column.state, column.sd, column.correlation});
+  // Where a trial's first row lacks a value it is somewhere about the gait's.
+  const dynamics::TwoLinkWalker walker = statement.setting.map().walker();
+  const std::vector<double> gait =
+      gait_state(statement.setting, dynamics::find_gait(walker, statement.setting.slope_deg * degree));
+  for (std::size_t s = 0; s < machine->states.size(); ++s)
+    machine->launches.push_back({machine->states[s], gait[s], unknown_launch * std::abs(gait[s])});
   Walks walks{told->title, {}, {}};
   WalkReader(source, *machine, walks.runs, defects).read();
   defects.check();

@@ -23,6 +23,9 @@ struct Walks {
   MachineRuns runs;
 };
 
+/// Says whether a folder's experiment.toml states `system = "machine"`; false where it cannot be read.
+bool holds_walks(const std::filesystem::path& folder);
+
 /// Reads a folder whose experiment.toml states `system = "machine"`; nothing where it states another.
 /// Checks names, types and ranges of keys and columns, steps of a trial in order without gap, trials that stand
 /// together, and outcomes of those trials only.

@@ -14,7 +14,7 @@ constexpr double feet = 1e-9;  // mass of the simplest walker's feet, in masses 
 // Where each value stands in MachineBatch::values.
 struct Places {
   std::size_t slope = 0, slope_sd = 1, damping = 2, torque = 3, loss = 4, slip = 5, mass_ratio = 6, higher = 7,
-              longer = 8, stance_leg = 9;
+              stance_leg = 8;
 };
 
 dynamics::UnevenWalker ideal(Walker walker) {
@@ -36,7 +36,7 @@ dynamics::UnevenWalker walker_of(const WalkerStatement& s, const MachineBatch& b
   if (s.setting.walker == Walker::simplest || !s.legs) return w;
   dynamics::WalkerLeg& first = batch.value(at.stance_leg, i) < 1.5 ? w.stance : w.swing;
   first.mass *= batch.value(at.mass_ratio, i);
-  first.foot_to_mass += batch.value(at.higher, i) + batch.value(at.longer, i);
+  first.foot_to_mass += batch.value(at.higher, i);
   first.mass_to_hip -= batch.value(at.higher, i);
   return w;
 }
@@ -76,8 +76,7 @@ Machine walker_machine(const WalkerStatement& statement) {
   const double roughness = setting.slope_sd_deg;
   machine.parameters = {
       {"slope_deg", setting.slope_deg, statement.slope_known_deg, 0, 45},
-      {"slope_sd_deg", roughness, statement.roughness_known_deg > 0 ? statement.roughness_known_deg : roughness,
-       1e-4 * roughness, 45}};
+      {"slope_sd_deg", roughness, statement.roughness_known_deg.value_or(roughness), 1e-4 * roughness, 45}};
   machine.may_vary = {"slope_deg"};
   // Bounds of the compass in units of its own: 5 N m s/rad stops its swing leg within a step.
   machine.effects = {{"hip_damping", {{"damping", 0, 0, compass ? 5.0 : 2.0}}},
@@ -86,7 +85,6 @@ Machine walker_machine(const WalkerStatement& statement) {
                      {"foot_slip", {{"slip", 0, 0, 0.2}}}};
   if (!compass || !statement.legs) return machine;
   machine.effects.push_back({"leg_mass", {{"mass_ratio", 1, 0.5, 2}, {"higher", 0, -0.2, 0.2}}});
-  machine.effects.push_back({"leg_length", {{"longer", 0, -0.1, 0.1}}});
   machine.inputs = {"stance_leg"};
   return machine;
 }

@@ -140,39 +140,18 @@ double falling_root(double low, double high, const Value& value, const Rate& rat
   return time;
 }
 
-/// Holds how far above the ground the swing foot is, as an angle: theta + psi, less what legs of unequal lengths have
-/// where both feet stand. `uneven` is the difference of their lengths over the sum.
-struct Clearance {
-  double uneven;
-  double value(double theta, double psi) const {
-    return theta + psi - (uneven == 0 ? 0 : 2 * std::atan(uneven / std::tan(0.5 * (theta - psi))));
-  }
-  double rate(double theta, double psi, double omega, double nu) const {
-    if (uneven == 0) return omega + nu;
-    const double s = std::sin(0.5 * (theta - psi)), c = std::cos(0.5 * (theta - psi));
-    return omega + nu + uneven * (omega - nu) / (s * s + uneven * uneven * c * c);
-  }
-};
-
-/// The swing foot is over the ground before the stance foot where its clearance is positive and theta < 0, and strikes
-/// as that falls to zero. Returns the time of the strike within the step of the series, or nothing. `end` is the motion
-/// at the end of the step.
-std::optional<double> strike_time(const Motion& m, std::size_t lane, double step, const Motion& end,
-                                  const Clearance& clearance) {
-  if (!(end.theta[0][lane] < 0) || clearance.value(end.theta[0][lane], end.psi[0][lane]) > 0) return std::nullopt;
-  const auto gap = [&](double t) { return clearance.value(at(m.theta, lane, t), at(m.psi, lane, t)); };
-  const auto rate = [&](double t) {
-    const double omega = at(m.omega, lane, t), nu = at(m.nu, lane, t);
-    return clearance.uneven == 0 ? omega + nu : clearance.rate(at(m.theta, lane, t), at(m.psi, lane, t), omega, nu);
-  };
-  const auto rate_at = [&](const Motion& here) {
-    return clearance.rate(here.theta[0][lane], here.psi[0][lane], here.omega[0][lane], here.nu[0][lane]);
-  };
+/// The swing foot is over the ground before the stance foot where theta + psi > 0 and theta < 0, and strikes as that
+/// sum falls to zero. Returns the time of the strike within the step of the series, or nothing. `end` is the motion at
+/// the end of the step.
+std::optional<double> strike_time(const Motion& m, std::size_t lane, double step, const Motion& end) {
+  if (end.theta[0][lane] + end.psi[0][lane] > 0 || !(end.theta[0][lane] < 0)) return std::nullopt;
+  const auto gap = [&](double t) { return at(m.theta, lane, t) + at(m.psi, lane, t); };
+  const auto rate = [&](double t) { return at(m.omega, lane, t) + at(m.nu, lane, t); };
   double low = 0;
-  if (!(clearance.value(m.theta[0][lane], m.psi[0][lane]) > 0)) {
+  if (!(m.theta[0][lane] + m.psi[0][lane] > 0)) {
     // The foot may have risen and come down within the step.
-    if (!(rate_at(m) > 0 && rate_at(end) < 0)) return std::nullopt;
-    low = falling_root(0, step, rate, [&](double t) {  // exact for equal legs, else a guide for Newton's steps
+    if (!(m.omega[0][lane] + m.nu[0][lane] > 0 && end.omega[0][lane] + end.nu[0][lane] < 0)) return std::nullopt;
+    low = falling_root(0, step, rate, [&](double t) {
       double slope = 0;
       for (std::size_t k = order; k >= 1; --k)
         slope = slope * t + static_cast<double>(k) * (m.omega[k][lane] + m.nu[k][lane]);
@@ -215,7 +194,6 @@ class Way {
       equations_.stance_damping[k] = e.stance_damping;
       equations_.swing_damping[k] = e.swing_damping;
       friction_[k] = {e.stance_friction, e.swing_friction};
-      clearance_[k] = {e.uneven};
       hip_ = hip_ || e.stance_damping != 0 || e.swing_damping != 0 || e.stance_friction != 0;
       taylor_step_[k] = courses[i].taylor_step;
       start(now(), k, from[i], slopes[i]);
@@ -257,7 +235,7 @@ class Way {
     at_ = 1 - at_;
   }
   std::optional<LegMotion> struck(std::size_t lane) const {
-    const auto time = strike_time(now(), lane, steps_[lane], next(), clearance_[lane]);
+    const auto time = strike_time(now(), lane, steps_[lane], next());
     if (!time) return std::nullopt;
     return after(lane, *time);
   }
@@ -283,7 +261,6 @@ class Way {
   std::array<Motion, 2> motions_;  // start() and advance() set what expand() takes
   std::size_t at_ = 0;             // which of them is now
   Equations equations_{};
-  std::array<Clearance, width> clearance_{};
   std::array<std::pair<double, double>, width> friction_{};
   std::array<double, width> sign_{};
   std::array<bool, width> turns_back_{};  // at the moment that the series start from

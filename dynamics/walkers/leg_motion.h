@@ -26,7 +26,6 @@ struct LegEquations {
   double p = 0, q = 0, r = 0, w = 0;               ///< q, w [1/s^2]
   double stance_damping = 0, swing_damping = 0;    ///< damping over A, over C [1/s]
   double stance_friction = 0, swing_friction = 0;  ///< friction over A, over C [1/s^2]
-  double uneven = 0;  ///< length of the stance leg less that of the swing leg, over their sum
 };
 
 /// Says how a step is followed. [s]

@@ -16,10 +16,6 @@ double stance_inertia(const UnevenWalker& w) {
   return (w.hip_mass + w.swing.mass) * l * l + w.stance.mass * a * a;
 }
 
-double uneven(const UnevenWalker& w) {
-  return (w.stance.length() - w.swing.length()) / (w.stance.length() + w.swing.length());
-}
-
 LegEquations equations_of(const UnevenWalker& w) {
   const double l = w.stance.length(), b = w.swing.mass_to_hip, m = w.swing.mass;
   const double inertia = stance_inertia(w), swing_inertia = m * b * b;
@@ -30,14 +26,7 @@ LegEquations equations_of(const UnevenWalker& w) {
           .stance_damping = w.hip_damping / inertia,
           .swing_damping = w.hip_damping / swing_inertia,
           .stance_friction = w.hip_friction / inertia,
-          .swing_friction = w.hip_friction / swing_inertia,
-          .uneven = uneven(w)};
-}
-
-// Both feet stand on the plane: l cos(theta) is the same for both legs, and theta - psi is the angle between them.
-LegMotion both_standing(const UnevenWalker& w, const double* state) {
-  const double tilt = std::atan(uneven(w) / std::tan(state[0]));
-  return {0, state[0] + tilt, -state[0] + tilt, state[1], state[2]};
+          .swing_friction = w.hip_friction / swing_inertia};
 }
 
 void strike(const UnevenWalker& w, const LegMotion& before, double* after) {
@@ -77,7 +66,7 @@ void step_uneven(std::span<const UnevenWalker> walkers, std::span<const double> 
       fell[i] = 1;
       const UnevenWalker& w = walkers[i];
       if (!walkable(&states[3 * i]) || !std::isfinite(slopes[i])) continue;
-      from[walking] = both_standing(w, &states[3 * i]);
+      from[walking] = {0, states[3 * i], -states[3 * i], states[3 * i + 1], states[3 * i + 2]};
       slope[walking] = slopes[i];
       equations[walking] = equations_of(w);
       courses[walking] = {taylor_share * std::sqrt(std::min(w.stance.length(), w.swing.mass_to_hip) / w.gravity),

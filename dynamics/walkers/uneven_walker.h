@@ -17,7 +17,7 @@ struct WalkerLeg {
   double length() const { return foot_to_mass + mass_to_hip; }
 };
 
-/// Holds a walker as it begins a step.
+/// Holds a walker as it begins a step. Both legs have one length.
 struct UnevenWalker {
   WalkerLeg stance, swing;
   double hip_mass = 10;     ///< [kg], >= 0

@@ -1,7 +1,5 @@
 #include "markov/splitting/learnt_level.h"
 
-#include <fmt/format.h>
-
 #include <Eigen/Core>
 #include <algorithm>
 #include <array>

@@ -23,7 +23,6 @@ struct Visits {
 /// along the principal axes of their correlations; axes narrower than 0.05 of the widest count as that wide.
 class VisitFrame {
  public:
-  /// @throws MapError naming the number of the state that nothing moves
   VisitFrame(const BatchMap& map, const Visits::Phase& visits);
   /// Writes the coordinates of a state.
   void place(std::span<const double> state, std::span<float> coordinates) const;

@@ -100,7 +100,12 @@ class Pilot {
       frames_.clear();
       for (const Visits::Phase& phase : visits_.phases) frames_.emplace_back(map_, phase);
       pilot_.mixing_steps = mixing();
-      if (4 * pilot_.mixing_steps <= static_cast<double>(ensemble_.steps()) || calls() > options_.most_calls) return;
+      if (4 * pilot_.mixing_steps <= static_cast<double>(ensemble_.steps())) return;
+      if (calls() > options_.most_calls)
+        throw std::runtime_error(fmt::format(
+            "splitting: the start is not forgotten within {} steps (memory lasts some {:.3g}, by what is seen of "
+            "it): no number is given",
+            ensemble_.steps(), pilot_.mixing_steps));
       steps = revolutions(std::min(4 * pilot_.mixing_steps, 4.0 * static_cast<double>(ensemble_.steps())));
     }
   }
@@ -140,18 +145,22 @@ class Pilot {
       }
       alive.resize(left), states.resize(left * d);
     }
-    Eigen::MatrixXd before(alive.size(), d), after(alive.size(), d);
+    // Squares see memory that is not linear: a state whose sign is drawn anew.
+    Eigen::MatrixXd before(alive.size(), 2 * d), after(alive.size(), 2 * d);
     std::vector<float> at(d);
     for (std::size_t i = 0; i < alive.size(); ++i)
       for (const bool later : {false, true}) {
         frames_[0].place(later ? std::span<const double>(states).subspan(i * d, d)
                                : std::span<const double>(first).subspan(alive[i] * d, d),
                          at);
-        for (std::size_t k = 0; k < d; ++k)
-          (later ? after : before)(static_cast<Eigen::Index>(i), static_cast<Eigen::Index>(k)) =
-              static_cast<double>(at[k]);
+        for (std::size_t k = 0; k < d; ++k) {
+          const auto x = static_cast<double>(at[k]);
+          Eigen::MatrixXd& of = later ? after : before;
+          of(static_cast<Eigen::Index>(i), static_cast<Eigen::Index>(k)) = x;
+          of(static_cast<Eigen::Index>(i), static_cast<Eigen::Index>(d + k)) = x * x - 1;
+        }
       }
-    if (alive.size() < 2 * d) return static_cast<double>(map_.phases);
+    if (alive.size() < 4 * d) return static_cast<double>(map_.phases);
     const Eigen::MatrixXd gram =
         before.transpose() * before +
         1e-3 * static_cast<double>(alive.size()) * Eigen::MatrixXd::Identity(before.cols(), before.cols());

@@ -18,6 +18,7 @@ namespace metastable::markov {
 namespace {
 
 constexpr double fewest_lines = 30;
+constexpr double shortest_burn_in = 30;  // steps, as memory that is not linear is seen in part only
 constexpr double refused_level = 1e-3;
 constexpr double widest = 4;  // upper over lower end of an interval that is given
 
@@ -42,13 +43,20 @@ class Study {
     learn();
     rounds_.resize(static_cast<std::size_t>(options_.rounds));
     const std::uint64_t revolution = static_cast<std::uint64_t>(map_.phases);
-    burn_in_ = whole(std::max(3 * mixing_, 2.0 * static_cast<double>(window_)), revolution);
-    std::uint64_t more = whole(std::max(4 * mixing_, 100.0), 2 * revolution);
+    burn_in_ = whole(std::max({3 * mixing_, 2.0 * static_cast<double>(window_), shortest_burn_in}), revolution);
+    std::uint64_t more = whole(std::max({4 * mixing_, 4.0 * static_cast<double>(window_), 100.0}), 2 * revolution);
+    const double first_walk =
+        static_cast<double>(burn_in_ + more) * static_cast<double>(options_.replicas) * options_.rounds;
+    if (first_walk > static_cast<double>(options_.most_calls))
+      throw std::runtime_error(fmt::format(
+          "splitting: the start is forgotten in some {:.3g} steps, so that the rounds would take {:.3g} steps of "
+          "the map: no number is given",
+          mixing_, first_walk));
     for (;;) {
       walk(more);
       estimate();
       const double half = 0.5 * std::log(found_.steps.upper / found_.steps.lower);
-      if (half <= options_.tolerance) break;
+      if (half <= options_.tolerance && found_.lines >= fewest_lines) break;
       const double wanted =
           std::isfinite(half) ? std::clamp(1.1 * half * half / (options_.tolerance * options_.tolerance) - 1, 0.25, 3.0)
                               : 3.0;
@@ -277,6 +285,9 @@ void require_agreement(const MeshStudy& mesh, const SplittingStudy& splitting, c
 
 SplittingStudy splitting_study(const BatchMap& map, std::span<const double> start, const SplittingOptions& options) {
   require_start(map, start);
+  for (std::size_t k = 0; k < start.size(); ++k)
+    if (!std::isfinite(start[k]))
+      throw std::invalid_argument(fmt::format("start: number {} is {}, a finite number expected", k + 1, start[k]));
   if (!(options.tolerance > 0))
     throw std::invalid_argument(fmt::format("splitting: a tolerance of {}, above 0 expected", options.tolerance));
   if (options.replicas == 0) {

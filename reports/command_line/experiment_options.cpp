@@ -7,6 +7,7 @@
 
 #include "analysis/experiment/stand_in.h"
 #include "analysis/experiment/suggestion.h"
+#include "analysis/walker_model/walk_folder.h"
 #include "analysis/wheel_model/wheel_transitions.h"
 #include "dynamics/wheel/contact_law.h"
 #include "reports/command_line/command.h"
@@ -402,7 +403,12 @@ void declare_diagnose(Options& o) {
 DiagnoseRequest diagnose_request(const Options& o, const std::string& line) {
   DiagnoseRequest request;
   request.folder = o.text("DIR");
-  if (o.given("catalogue")) request.options.catalogue = catalogue_value("catalogue", o.text("catalogue"));
+  if (o.given("catalogue")) {
+    // Effects of walks are those of their machine, which is known once they are read.
+    const bool walks = !request.folder.empty() && analysis::holds_walks(request.folder);
+    request.options.catalogue =
+        catalogue_value("catalogue", o.text("catalogue"), walks ? std::vector<std::string>{} : effect_ids());
+  }
   for (const char* place : {analysis::other_slope, analysis::other_launch})
     if (o.given(place)) request.options.elsewhere.emplace_back(place, o.number(place));
   request.options.seed = o.seed();

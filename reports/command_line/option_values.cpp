@@ -206,10 +206,13 @@ std::vector<std::string> effect_ids() {
   return ids;
 }
 
-std::vector<std::string> catalogue_value(std::string_view name, const std::string& text) {
+std::vector<std::string> catalogue_value(std::string_view name, const std::string& text,
+                                         const std::vector<std::string>& known) {
   std::vector<std::string> ids;
-  const auto take = [&ids](std::string_view word, const std::string& where) {
+  const auto take = [&](std::string_view word, const std::string& where) {
     const std::string id(trimmed(word));
+    for (const std::string_view one : split(id, '+'))
+      if (!known.empty()) analysis::require_word(where, one, known);
     if (std::ranges::count(id, '+') > 1)
       throw std::invalid_argument(fmt::format("{}: \"{}\" has more than two effects", where, id));
     if (std::find(ids.begin(), ids.end(), id) == ids.end()) ids.push_back(id);

@@ -41,6 +41,7 @@ std::vector<dynamics::Contact> contact_list(const std::string& file);
 std::vector<std::string> effect_ids();
 /// Reads ids of effects from a comma list, or from a file with one a line (# starts a comment); each once, in that
 /// order. Errors name the id and the known ones, in a file the line too.
-std::vector<std::string> catalogue_value(std::string_view name, const std::string& text);
+std::vector<std::string> catalogue_value(std::string_view name, const std::string& text,
+                                         const std::vector<std::string>& known = effect_ids());
 
 }  // namespace metastable::reports

@@ -49,8 +49,6 @@ std::optional<SplittingAnswer> ask_both_ways(WalkerMethod method, const std::str
   if (method == WalkerMethod::mesh) mesh();
   if (method == WalkerMethod::both) try {
       found = mesh();
-    } catch (const markov::Disagreement& error) {
-      answer.no_mesh = error.what();
     } catch (const markov::MapError& error) {
       answer.no_mesh = error.what();
     } catch (const markov::TooManyDimensions& error) {
@@ -103,7 +101,8 @@ std::string walker_answer_json(const WalkerRequest& request, const WalkerAnswer&
 
 std::string walker_answer_text(const WalkerRequest& request, const WalkerAnswer& answer, std::size_t width) {
   if (request.settings.size() > 1) return walkers_text(request.settings, answer.studies);
-  if (answer.studies.empty()) return splitting_text(*answer.splitting);
+  if (answer.studies.empty())
+    return splitting_text(*answer.splitting) + (request.how_it_fails ? "How it fails is told from a mesh only.\n" : "");
   const std::string text = walker_text(request.settings.front(), answer.studies.front(), answer.moments, width);
   return answer.splitting ? with_splitting_text(text, answer.splitting->passage) : text;
 }

@@ -172,7 +172,8 @@ std::vector<Figure> return_map_figures(const Diagnosis& d) {
       const analysis::Event* before = nullptr;
       for (const analysis::Event& event : model.events()) {
         if (event.column != c || event.kind != analysis::EventKind::step) continue;
-        if (before && before->trial == event.trial && before->number + 1 == event.number) {
+        if (before && before->trial == event.trial && before->number + 1 == event.number &&
+            std::isfinite(before->speed) && std::isfinite(event.speed)) {
           series.x.push_back(before->speed);
           series.y.push_back(event.speed);
         }

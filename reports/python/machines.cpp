@@ -166,6 +166,8 @@ py::object diagnose_walks(const std::string& folder, const py::dict& options, co
   Call call(progress);
   call.run([&] { walks = analysis::read_walks(folder); });
   if (!walks) return py::none();
+  for (const char* name : {"at_slope", "at_speed"})
+    if (options.contains(name)) throw std::invalid_argument(std::string(name) + ": has no meaning with walks");
   const Arguments given(options);
   analysis::DiagnosisOptions study;
   study.seed = given.whole("seed", 0, UINT64_MAX);

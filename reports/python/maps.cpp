@@ -52,7 +52,7 @@ Asked asked_of(const Arguments& given, bool several = false) {
     asked.method = walker_method(*options);
     asked.splitting = splitting_options(*options);
     if (asked.method == WalkerMethod::splitting && given.given("guided_samples"))
-      throw std::invalid_argument("guided_samples: has no meaning under --method splitting");
+      throw std::invalid_argument("guided_samples: has no meaning with method \"splitting\"");
   }
   read_guided_samples(given, asked.mesh);
   return asked;

@@ -603,8 +603,6 @@ def diagnose(experiment, machine=None, *, catalogue=(), at_slope=None, at_speed=
         if not isinstance(experiment, Experiment):
             walks = _metastable.diagnose_walks(os.fspath(experiment), options, command, tell)
             if walks is not None:
-                if at_slope is not None or at_speed is not None:
-                    raise InputError("at_slope, at_speed: have no meaning with walks")
                 return Diagnosis(walks)
         return Diagnosis(_metastable.diagnose(_experiment(experiment), options, command, tell))
 

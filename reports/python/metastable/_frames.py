@@ -118,7 +118,7 @@ def plot_walked(ax, steps, failed):
 def drawn(script):
     """What gnuplot draws of a script, as SVG for a notebook; nothing where gnuplot is not installed or fails."""
     try:
-        ran = subprocess.run(["gnuplot"], input=script, capture_output=True, text=True, timeout=30, check=True)
+        ran = subprocess.run(["gnuplot"], input=script, capture_output=True, encoding="utf-8", timeout=30, check=True)
     except (OSError, subprocess.SubprocessError):
         return ""
     return ran.stdout[max(ran.stdout.find("<svg"), 0):]

@@ -38,16 +38,14 @@ class HeldBodies {
   }
 
   Step step(const std::array<double, 3>& state) const {
-    const double tilt = std::atan((w_.stance.length() - w_.swing.length()) / (w_.stance.length() + w_.swing.length()) /
-                                  std::tan(state[0]));
-    Vector q = placed(state[0] + tilt, -state[0] + tilt), v = moving(q, state[1], state[2]);
+    Vector q = placed(state[0], -state[0]), v = moving(q, state[1], state[2]);
     const double h = 1e-3;
     double over = 0;
     for (int i = 0; i < 20000; ++i) {
       const Vector q0 = q, v0 = v;
       advance(q, v, h);
       const double now = height(q);
-      if (q[2] < 0 && over > 0 && now <= 0) {
+      if (q[2] < 0 && q[5] > 0 && over > 0 && now <= 0) {
         double low = 0, high = h;
         for (int k = 0; k < 45; ++k) {
           const double middle = 0.5 * (low + high);
@@ -58,6 +56,7 @@ class HeldBodies {
         }
         return {false, struck(q, v)};
       }
+      if (std::abs(q[2]) > 1.6) break;
       over = now;
     }
     return {true, {}};
@@ -154,8 +153,8 @@ TEST(UnevenWalker, WithEqualLegsIsTheCompassGait) {
 
 TEST(UnevenWalker, IsWhatHeldBodiesDo) {
   UnevenWalker uneven;
-  uneven.stance = {5.5, 0.47, 0.55};
-  uneven.swing = {4.6, 0.52, 0.49};
+  uneven.stance = {5.5, 0.47, 0.53};
+  uneven.swing = {4.6, 0.52, 0.48};
   expect_as_held(uneven, 1e-8);
   std::swap(uneven.stance, uneven.swing);
   expect_as_held(uneven, 1e-8);

@@ -21,7 +21,7 @@ TEST(OptionValues, ACatalogueOfAllEffectsIsAList) {
   EXPECT_EQ(catalogue_value("catalogue", all).size(), dynamics::effect_catalogue().size());
 }
 
-TEST(OptionValues, ACatalogueTakesPairsAndTellsOfAMissingFile) {
+TEST(OptionValues, ACatalogueTakesPairsAndTellsAMissingFileFromAnUnknownEffect) {
   EXPECT_EQ(catalogue_value("catalogue", "bounce, trial_drift+bounce"),
             (std::vector<std::string>{"bounce", "trial_drift+bounce"}));
   const auto message = [](const std::string& text) -> std::string {
@@ -29,6 +29,7 @@ TEST(OptionValues, ACatalogueTakesPairsAndTellsOfAMissingFile) {
   };
   EXPECT_EQ(message("list.txt"), "--catalogue: list.txt: no such file, nor a list of effects");
   EXPECT_EQ(message("bounce+air_drag+inertia"), "--catalogue: \"bounce+air_drag+inertia\" has more than two effects");
+  EXPECT_NE(message("bounce+wind").find("'wind' is none of"), std::string::npos);
 }
 
 TEST(OptionValues, ANumberOutOfRangeIsToldTheRangeAndATextThatItIsNone) {
