@@ -33,6 +33,15 @@ std::map<std::string, Detectability> look(const TransitionModel& model, const st
   return seen;
 }
 
+// Returns values for the nuisances of another model of the same machine: with other columns it may have fewer, or more.
+std::vector<double> carried(const TransitionModel& from, const std::vector<double>& values, const TransitionModel& to) {
+  std::vector<double> all = nominal_values(to);
+  for (std::size_t i = 0; i < all.size(); ++i)
+    for (std::size_t j = 0; j < values.size(); ++j)
+      if (to.nuisances()[i].name == from.nuisances()[j].name) all[i] = values[j];
+  return all;
+}
+
 double share_of(const Detectability& v, const std::string& other) {
   for (const auto& [effect, share] : v.alike)
     if (effect == other) return share;
@@ -47,12 +56,12 @@ std::vector<MissingColumn> missing_columns(const TransitionModel& model, const F
   std::vector<MissingColumn> all;
   const auto completed = model.completed(recalibrated.nuisance, seed);
   if (completed.empty()) return all;
-  const auto now =
-      look(*model.simulate(recalibrated.nuisance, {}, seed), recalibrated.nuisance, candidates, rules, threads);
+  const auto drawn = model.simulate(recalibrated.nuisance, {}, seed);
+  const auto now = look(*drawn, carried(model, recalibrated.nuisance, *drawn), candidates, rules, threads);
   for (const auto& [column, with_it] : completed) {
     MissingColumn missing;
     missing.column = column;
-    const auto then = look(*with_it, recalibrated.nuisance, candidates, rules, threads);
+    const auto then = look(*with_it, carried(model, recalibrated.nuisance, *with_it), candidates, rules, threads);
     for (const Candidate* candidate : candidates) {
       const auto before = now.find(candidate->id), after = then.find(candidate->id);
       if (before == now.end() || after == then.end() || !after->second.undecidable.empty() ||
