@@ -21,7 +21,7 @@ source=$1 build=$2 python=${3:-}
 pages=$build/source
 rm -rf "$pages"
 mkdir -p "$pages" "$build/xml"
-cp -r "$source"/reports/site/{conf.py,static,samples,results,*.md} "$pages"
+cp -r "$source"/reports/site/{conf.py,static,samples,notebooks,results,*.md} "$pages"
 rm "$pages/README.md"
 
 # All headers with their folders, in which the reference looks its public ones up.
