@@ -50,7 +50,7 @@ class BeliefMixture {
     int bent = 0;  ///< 0, 1 or 2
     std::array<BeliefVector<Most>, 3> bends = {};
 
-    /// Where on the bend the part is: u and v, and their covariance.
+    /// A place on the bend: the means of u and v, and their covariance.
     struct Place {
       Eigen::Vector2d around;
       Eigen::Matrix2d left;

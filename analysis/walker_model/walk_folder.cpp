@@ -233,7 +233,7 @@ std::optional<Walks> read_walks(const std::filesystem::path& folder) {
   auto machine = std::make_shared<Machine>(walker_machine(statement));
   for (const WalkDescription::Column& column : told->columns)
     machine->observe.push_back({column.state, column.sd, column.correlation});
-  // Where a trial's first row lacks a value it is somewhere about the gait's.
+  // A value that a trial's first row lacks is drawn from around the gait's.
   const dynamics::TwoLinkWalker walker = statement.setting.map().walker();
   const std::vector<double> gait =
       gait_state(statement.setting, dynamics::find_gait(walker, statement.setting.slope_deg * degree));

@@ -11,7 +11,7 @@ namespace {
 
 constexpr double feet = 1e-9;  // mass of the simplest walker's feet, in masses of the hip
 
-// Where each value stands in MachineBatch::values.
+// The index of each value in MachineBatch::values.
 struct Places {
   std::size_t slope = 0, slope_sd = 1, damping = 2, torque = 3, loss = 4, slip = 5, mass_ratio = 6, higher = 7,
               stance_leg = 8;

@@ -46,7 +46,7 @@ class Pilot {
             ensemble_.failures() == 0 ? "nothing fails" : fmt::format("only {} replicas fail", ensemble_.failures()),
             calls()));
       split(levels);
-      // Where no more bins came of it, few replicas reach beyond the last one: they are waited for.
+      // If no bin was added, few replicas reach beyond the last one, and the next spread gives them more steps.
       const std::size_t now = levels.edges.front().size();
       if (now <= bins) steps += revolutions(static_cast<double>(steps) / 2);
       bins = now;

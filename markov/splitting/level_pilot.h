@@ -10,7 +10,7 @@
 
 namespace metastable::markov {
 
-/// What is left of the memory of a state after the time that counts as mixing.
+/// The share of a state's memory that is left after the mixing time.
 inline constexpr double left_of_memory = 0.05;
 
 struct PilotOptions {

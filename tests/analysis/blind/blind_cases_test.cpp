@@ -74,7 +74,7 @@ TEST(BlindCases, LawsTakeTurnsWhereBothHaveTheEffect) {
     for (const std::string& id : p.effects) EXPECT_TRUE(can_be_had(id, p.law)) << id;
   }
   EXPECT_EQ(count[BlindKind::none][Law::settled], 5);
-  // Of 24 effects four are published's and one is settled's.
+  // The catalogue has 24 effects. Four exist under `published` only, one under `settled` only.
   EXPECT_EQ(count[BlindKind::effect][Law::settled], 19 * 6 / 2 + 6);
   EXPECT_EQ(count[BlindKind::outside][Law::settled], 8);
   EXPECT_EQ(blind_plan({1, 0, 0, 18, 0, {Law::settled}}, 5).size(), 20U * 3 + 16);

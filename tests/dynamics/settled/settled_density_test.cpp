@@ -22,7 +22,7 @@ constexpr double degree = std::numbers::pi / 180;
 constexpr double slope = 7.02 * degree;
 constexpr ContactSpread usual{0.4, 0.05, 0.38, 0.03};
 
-// Has equal legs, whose grid is one leg's.
+// The wheel has equal legs, so that the grid of one leg serves all of them.
 Wheel equal_wheel() {
   Wheel wheel;
   wheel.leg_length.assign(8, 0.152);

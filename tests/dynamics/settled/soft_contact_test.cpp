@@ -18,7 +18,7 @@ constexpr double hub_inertia = 0.0025;  // [kg m^2]
 constexpr double slope = 9.59 * degree;
 constexpr ContactSpread usual{0.4, 0.05, 0.4, 0.03};
 
-// Has equal legs, whose grid is one leg's.
+// The wheel has equal legs, so that the grid of one leg serves all of them.
 Wheel equal_wheel() {
   Wheel wheel;
   wheel.leg_length.assign(8, 0.152);
