@@ -214,7 +214,7 @@ bool MachineRuns::placed() const {
   return every_row(*this, [](const MachineRow& row) { return std::isfinite(row.position); });
 }
 
-// In two passes: a column far from zero keeps its spread.
+// The sums are taken in two passes, so that a column far from zero keeps its spread.
 ColumnSpread column_spread(const MachineRuns& runs, std::size_t sensor) {
   const std::vector<double> values = column(runs, sensor);
   if (values.empty()) return {};

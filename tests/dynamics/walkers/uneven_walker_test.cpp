@@ -110,7 +110,7 @@ class HeldBodies {
       force.segment(at, 2) = -w_.gravity * mass_[at] * Eigen::Vector2d(std::sin(slope), std::cos(slope));
     force[2] = -torque;
     force[5] = torque;
-    // What the turning of the legs adds to the accelerations of their ends, with the sign changed.
+    // The constraints want the centripetal accelerations of the legs' ends, with the sign changed.
     turning << -w_.stance.foot_to_mass * v[2] * v[2] * along(q[2]), w_.stance.mass_to_hip * v[2] * v[2] * along(q[2]),
         w_.swing.mass_to_hip * v[5] * v[5] * along(q[5]);
     return solved(jacobian(q, true), force, turning);

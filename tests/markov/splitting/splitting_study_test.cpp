@@ -44,7 +44,7 @@ TEST(SplittingStudy, TakesMapsOfSeveralPhases) {
   EXPECT_NO_THROW(require_agreement(walked, study, "two phases"));
 }
 
-/// Has eight numbers: the line of linear_batch(), and seven that fade, mixed by a reflection.
+/// The state has eight numbers: the line of linear_batch(), and seven that fade, mixed by a reflection.
 BatchMap eight_batch(double sd) {
   BatchMap map;
   map.dimension = map.scores = 8;
