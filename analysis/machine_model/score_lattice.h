@@ -21,6 +21,29 @@ struct LatticeAxis {
 /// @param axes  of the lattice: the more, the coarser they are, 1 or 2
 LatticeAxis lattice_axis(int axes);
 
+/// A lattice over some of a machine's scores.
+struct ScoreLattice {
+  std::vector<std::size_t> scores;  ///< that it is over, at most two; the first one runs fastest
+  LatticeAxis axis;                 ///< of each
+
+  /// Counts its points; none without scores.
+  std::size_t points() const {
+    std::size_t count = scores.empty() ? 0 : 1;
+    for (std::size_t b = 0; b < scores.size(); ++b) count *= axis.points.size();
+    return count;
+  }
+  /// Returns all `count` scores at a point: those that it is not over are zero.
+  template <class Vector>
+  Vector at(std::size_t point, std::size_t count) const {
+    Vector fresh = Vector::Zero(static_cast<typename Vector::Index>(count));
+    for (const std::size_t score : scores) {
+      fresh[static_cast<typename Vector::Index>(score)] = axis.points[point % axis.points.size()];
+      point /= axis.points.size();
+    }
+    return fresh;
+  }
+};
+
 /// The part of a cell, N(centre, spread^2), inside some intervals.
 struct CellPart {
   double mass = 1, mean = 0, variance = 0;
