@@ -1,20 +1,21 @@
 // Counts how often the intervals of mesh studies hold what simulations say, and quadrature where it reaches: ten
 // settings, 20 seeds each.
-//   mesh_coverage [seeds] [first setting] [settings]
+//   mesh_coverage [seeds] [first setting] [settings] [first seed]
 
 #include <fmt/format.h>
 
 #include <cmath>
 #include <cstdio>
-#include <cstdlib>
 #include <optional>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "analysis/walkers/walker_study.h"
 #include "markov/mesh/batch_simulation.h"
 #include "markov/mesh/mesh_study.h"
 #include "markov/normal_95.h"
+#include "tests/benchmarks/coverage.h"
 #include "tests/markov/mesh/maps.h"
 
 namespace {
@@ -30,12 +31,8 @@ struct Tried {
 };
 
 Tried walker(analysis::Walker kind, double sd_rad, std::size_t trials) {
-  const analysis::WalkerSetting setting{kind, analysis::walker_slope_deg(kind), sd_rad / analysis::degree,
-                                        dynamics::Terrain::fresh};
-  const dynamics::WalkerMap map = setting.map();
-  return {fmt::format("{}, sd {} rad", analysis::walker_name(kind), sd_rad), analysis::batch_map(map),
-          analysis::gait_state(setting, dynamics::find_gait(map.walker(), setting.slope_deg * analysis::degree)),
-          trials};
+  auto [map, start] = walker_in_gait(kind, sd_rad / analysis::degree, dynamics::Terrain::fresh);
+  return {fmt::format("{}, sd {} rad", analysis::walker_name(kind), sd_rad), std::move(map), std::move(start), trials};
 }
 
 /// From 1e1 to 1e5 steps. Quadrature knows the linear map; of two dimensions one does not matter to failure.
@@ -66,11 +63,8 @@ std::vector<Tried> settings() {
 }  // namespace
 
 int main(int argc, char** argv) {
-  const int seeds = argc > 1 ? std::atoi(argv[1]) : 20;
   const std::vector<Tried> all = settings();
-  const std::size_t first = argc > 2 ? static_cast<std::size_t>(std::atoi(argv[2])) : 0;
-  const std::size_t last =
-      argc > 3 ? std::min(all.size(), first + static_cast<std::size_t>(std::atoi(argv[3]))) : all.size();
+  const auto [seeds, first_seed, first, last] = asked(argc, argv, 20, all.size());
   for (std::size_t i = first; i < last; ++i) {
     const Tried& tried = all[i];
     const auto simulated =
@@ -78,7 +72,7 @@ int main(int argc, char** argv) {
     const double relative = simulated->standard_error / simulated->mean;
     int held = 0, exactly = 0;
     double width = 0, bias = 0;
-    for (int seed = 1; seed <= seeds; ++seed) {
+    for (int seed = first_seed; seed < first_seed + seeds; ++seed) {
       const markov::MeshStudy study = markov::mesh_study(
           tried.map, tried.start,
           {.seed = static_cast<std::uint64_t>(seed), .threads = 1, .guided_samples = 0, .simulated_steps = 0});

@@ -6,16 +6,17 @@
 
 #include <cmath>
 #include <cstdio>
-#include <cstdlib>
 #include <ctime>
 #include <optional>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "analysis/study/setting.h"
 #include "analysis/walkers/walker_study.h"
 #include "markov/normal_95.h"
 #include "markov/splitting/splitting_study.h"
+#include "tests/benchmarks/coverage.h"
 #include "tests/markov/mesh/maps.h"
 
 namespace {
@@ -31,11 +32,8 @@ struct Tried {
 
 Tried walker(const std::string& name, analysis::Walker kind, double sd_deg, dynamics::Terrain terrain, double steps,
              double error) {
-  const analysis::WalkerSetting setting{kind, analysis::walker_slope_deg(kind), sd_deg, terrain};
-  const dynamics::WalkerMap map = setting.map();
-  return {name, analysis::batch_map(map),
-          analysis::gait_state(setting, dynamics::find_gait(map.walker(), setting.slope_deg * analysis::degree)), steps,
-          error};
+  auto [map, start] = walker_in_gait(kind, sd_deg, terrain);
+  return {name, std::move(map), std::move(start), steps, error};
 }
 
 /// Maps d numbers of unit variance, each x' = a x + z with an a of its own; it fails where one passes the threshold.
@@ -100,12 +98,8 @@ std::vector<Tried> settings() {
 }  // namespace
 
 int main(int argc, char** argv) {
-  const int seeds = argc > 1 ? std::atoi(argv[1]) : 10;
   const std::vector<Tried> all = settings();
-  const std::size_t first = argc > 2 ? static_cast<std::size_t>(std::atoi(argv[2])) : 0;
-  const std::size_t last =
-      argc > 3 ? std::min(all.size(), first + static_cast<std::size_t>(std::atoi(argv[3]))) : all.size();
-  const int first_seed = argc > 4 ? std::atoi(argv[4]) : 1;
+  const auto [seeds, first_seed, first, last] = asked(argc, argv, 10, all.size());
   for (std::size_t i = first; i < last; ++i) {
     const Tried& tried = all[i];
     int held = 0, refused = 0;
