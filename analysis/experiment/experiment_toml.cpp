@@ -299,8 +299,7 @@ void parse_experiment_toml(const std::string& file, std::string_view text, Exper
 }
 
 std::optional<WalkDescription> parse_walk_toml(const std::string& file, std::string_view text, Defects& defects) {
-  Defects other;  // a text that is no TOML is for the reader of wheels to refuse
-  const std::optional<toml::table> table = parse(file, text, other);
+  const std::optional<toml::table> table = parse(file, text, defects);
   if (!table || table->get("system") == nullptr || table->get("system")->value<std::string>() != "machine")
     return std::nullopt;
   Keys root(file, *table, "", defects);

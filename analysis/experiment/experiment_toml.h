@@ -28,7 +28,8 @@ struct WalkDescription {
   std::vector<Column> columns;     ///< those that were measured
 };
 
-/// Reads experiment.toml of walks, `system = "machine"`. Nothing where the file states another system, or none.
+/// Reads experiment.toml of walks, `system = "machine"`. Nothing where the file states another system, or none, and
+/// where it is no TOML, which is a defect.
 std::optional<WalkDescription> parse_walk_toml(const std::string& file, std::string_view text, Defects& defects);
 
 }  // namespace metastable::analysis

@@ -220,8 +220,9 @@ std::optional<Walks> read_walks(const std::filesystem::path& folder) {
   const ExperimentSource source = read_source(folder);
   Defects defects;
   const auto told = parse_walk_toml(file_in(source, "experiment.toml"), source.experiment_toml, defects);
-  if (!told) return std::nullopt;
+  if (!told && !(source.steps_csv && !source.collisions_csv)) return std::nullopt;
   defects.check();
+  if (!told) return std::nullopt;
   WalkerStatement statement;
   statement.setting = {walker_from_name(told->walker), told->slope_deg.mean, told->slope_sd_deg.mean,
                        dynamics::Terrain::fresh};

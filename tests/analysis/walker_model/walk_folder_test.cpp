@@ -82,6 +82,8 @@ TEST_F(WalkFolder, WhatIsWrongIsNamedWithItsPlace) {
     EXPECT_NE(message.find(part), std::string::npos) << message;
   };
   has(with(&WalkFiles::experiment_toml, "\"compass\"", "\"biped\""), "none of \"compass\", \"simplest\"");
+  has(with(&WalkFiles::experiment_toml, "[machine]", "[machine"), "experiment.toml:");
+  EXPECT_EQ(refused().find("collisions.csv"), std::string::npos);
   has(with(&WalkFiles::experiment_toml, "mean = 3", "mean = 50"), "slope_deg.mean: 50 is outside [0, 45)");
   has(with(&WalkFiles::experiment_toml, "half_angle_rad =", "half_angle ="), "unknown key 'half_angle' in columns");
   has(with(&WalkFiles::steps_csv, ",0.27", ",15.5"), "half_angle_rad: 15.5");
