@@ -65,11 +65,11 @@ CauseRanking rank_causes(const TransitionModel& model, const Fit& recalibrated,
   reach(0.6);
   EffectPairs ranked = rank_effect_pairs(problem, std::move(singles), options, [&] { reach(0.8); });
   reach(0.95);
-  bound_by_parts(problem, ranked.singles.causes, ranked.pairs);
+  bound_by_parts(problem, ranked.singles, ranked.singles.causes, ranked.pairs);
   std::vector<RankedCause> sets = rank_larger_sets(problem, ranked.singles, ranked.pairs);
-  bound_by_parts(problem, ranked.singles.causes, ranked.pairs);
-  bound_by_parts(problem, ranked.pairs, sets);
-  bound_by_parts(problem, sets, sets);
+  bound_by_parts(problem, ranked.singles, ranked.singles.causes, ranked.pairs);
+  bound_by_parts(problem, ranked.singles, ranked.pairs, sets);
+  bound_by_parts(problem, ranked.singles, sets, sets);
   reach(1);
   const double p_value = ranked.singles.chance.look_elsewhere(ranked.singles.least_p);
   return {std::move(ranked.singles.scan), std::move(ranked.singles.causes), std::move(ranked.pairs), std::move(sets),

@@ -13,9 +13,6 @@
 namespace metastable::analysis {
 namespace {
 
-// These numbers save time: they say which pairs are fitted.
-constexpr double alike_margin = 4;  // evidence promised below the best second effect's, for one worth fitting
-
 // These numbers say when an effect is fitted again from where a pair has it.
 constexpr double gained_beside = 9;  // by the pair, beyond the effect's own gain
 constexpr double lost_alone = 30;    // most that it is short of its own fit there, without the other [log likelihood]

@@ -17,8 +17,8 @@ namespace {
 // These numbers save time: they say which sets are fitted.
 constexpr double least_more_evidence = -4;  // promised beyond a hypothesis, for one more effect worth fitting
 constexpr double near_top = 4;              // evidence below the best, of a pair that is extended
-
-constexpr double hardly_more = 9;  // by a set beyond one of its parts: less, and the part bounds it
+constexpr int most_swaps = 3;               // rounds of effects put in the place of others
+constexpr std::size_t most_extended = 3;    // pairs
 
 // Says whether the model itself tells where the last term starts beside the others.
 bool knows_start(const TransitionModel& model, const std::vector<EffectTerm>& terms) {
@@ -42,6 +42,13 @@ const RankedCause* best_of(const std::vector<RankedCause>& all) {
 auto find_set(const std::vector<RankedCause>& all, const std::vector<EffectTerm>& terms) {
   return std::ranges::find_if(
       all, [&](const RankedCause& one) { return one.terms.size() == terms.size() && extends(one.terms, terms); });
+}
+
+// Weighs what the last effect of a set earned. Its variants count as they did alone.
+double evidence_of_last(const RankingProblem& problem, const SingleEffects& singles, const Candidate* last,
+                        double gain) {
+  const ScannedEffect* scanned = singles.scan.find(last);
+  return scanned ? evidence_of(*scanned, gain, problem.rules) : 0.5 * gain;
 }
 
 // Returns the better of the two single effects of a pair, as what the other one is beside.
@@ -70,14 +77,87 @@ void add_pairs_within(const RankingProblem& problem, const SingleEffects& single
                  problem.recalibrated);
     if (!std::isfinite(pair.evidence)) return;
     const double earned = measure_last(problem, singles, first, pair);
-    const auto parameters = static_cast<double>(terms[1].candidate->parameters.size());
-    pair.evidence = first.evidence + evidence_of_gain(earned, parameters, problem.rules) -
-                    std::log(static_cast<double>(terms[1].candidate->variants.size())) +
+    pair.evidence = first.evidence + evidence_of_last(problem, singles, terms[1].candidate, earned) +
                     log_prior_of_one_more(problem, 2);
     found[without] = std::move(pair);
   });
   for (RankedCause& pair : found)
     if (pair.fitted()) pairs.push_back(std::move(pair));
+}
+
+// Returns the best hypotheses of a kind, the best one first.
+std::vector<RankedCause> strongest_of(const std::vector<RankedCause>& all, std::size_t most) {
+  std::vector<double> evidence;
+  for (const RankedCause& one : all) evidence.push_back(one.evidence);
+  std::vector<RankedCause> strongest;
+  for (const std::size_t k : falling_order(evidence))
+    if (strongest.size() < most && std::isfinite(evidence[k])) strongest.push_back(all[k]);
+  return strongest;
+}
+
+// Fits what is worth it beside a hypothesis, where that is not the best one what promises to come near that.
+// @param best  evidence of the best  @param larger  gets the sets that it does not hold
+void extend(const RankingProblem& problem, const SingleEffects& singles, const RankedCause& base, double best,
+            std::vector<RankedCause>& larger) {
+  std::vector<ScannedEffect> worth = promising_beside(problem, scan_beside(problem, singles, base), base);
+  const double needed = best - base.evidence - log_prior_of_one_more(problem, base.terms.size() + 1) - near_top;
+  std::erase_if(worth, [&](const ScannedEffect& effect) {
+    if (base.evidence < best && evidence_of(effect, effect.gain[effect.best], problem.rules) < needed) return true;
+    std::vector<EffectTerm> terms = base.terms;
+    terms.push_back(term_at(effect, effect.best));
+    return find_set(larger, terms) != larger.end();
+  });
+  std::vector<RankedCause> fitted(worth.size());
+  markov::parallel_for(worth.size(), problem.threads, [&](std::size_t i) {
+    problem.heartbeat();
+    fitted[i] = with_one_more(problem, singles, base, worth[i]);
+  });
+  std::erase_if(fitted, [](const RankedCause& one) { return !std::isfinite(one.evidence); });
+  std::ranges::move(fitted, std::back_inserter(larger));
+}
+
+// Fits all effects beside a hypothesis that promise about as much as the best one does there, and forms no set anew.
+std::vector<RankedCause> fit_alike_beside(const RankingProblem& problem, const SingleEffects& singles,
+                                          const RankedCause& base, const std::vector<RankedCause>& known) {
+  const EffectScan scan = scan_beside(problem, singles, base);
+  std::vector<double> promised;
+  for (const ScannedEffect& effect : scan.effects)
+    promised.push_back(evidence_of(effect, effect.gain[effect.best], problem.rules));
+  std::vector<const ScannedEffect*> tries;
+  for (std::size_t k = 0; k < promised.size(); ++k) {
+    if (promised[k] < std::ranges::max(promised) - alike_margin) continue;
+    std::vector<EffectTerm> terms = base.terms;
+    terms.push_back(term_at(scan.effects[k], scan.effects[k].best));
+    if (find_set(known, terms) == known.end()) tries.push_back(&scan.effects[k]);
+  }
+  std::vector<RankedCause> fitted(tries.size());
+  markov::parallel_for(tries.size(), problem.threads, [&](std::size_t k) {
+    problem.heartbeat();
+    fitted[k] = with_one_more(problem, singles, base, *tries[k]);
+  });
+  std::erase_if(fitted, [](const RankedCause& one) { return !std::isfinite(one.evidence); });
+  return fitted;
+}
+
+// Puts others in the place of each effect of the best set, as long as that makes a better one: of effects that act
+// alike the first that was tried need not be the one that is there.
+void add_swaps(const RankingProblem& problem, const SingleEffects& singles, const std::vector<RankedCause>& pairs,
+               std::vector<RankedCause>& sets) {
+  for (int round = 0; round < most_swaps; ++round) {
+    const std::vector<EffectTerm> best = best_of(sets)->terms;
+    for (const EffectTerm& out : best) {
+      std::vector<EffectTerm> rest = best;
+      std::erase_if(rest, [&](const EffectTerm& one) { return one.candidate == out.candidate; });
+      const std::vector<RankedCause>& parts = rest.size() == 2 ? pairs : sets;
+      const auto part = find_set(parts, rest);
+      if (part == parts.end() || !part->fitted() || !std::isfinite(part->evidence)) continue;
+      problem.heartbeat();
+      std::ranges::move(fit_alike_beside(problem, singles, RankedCause(*part), sets), std::back_inserter(sets));
+    }
+    bound_by_parts(problem, singles, pairs, sets);
+    bound_by_parts(problem, singles, sets, sets);
+    if (extends(best_of(sets)->terms, best)) return;
+  }
 }
 
 }  // namespace
@@ -150,42 +230,38 @@ std::vector<RankedCause> rank_larger_sets(const RankingProblem& problem, const S
   std::vector<RankedCause> sets;
   const RankedCause* pair = best_of(pairs);
   if (!pair || pair->evidence < singles.top - near_top) return sets;
-  RankedCause base = *pair;
-  while (base.terms.size() < problem.effort.most_effects) {
-    problem.heartbeat();
-    const std::vector<ScannedEffect> worth = promising_beside(problem, scan_beside(problem, singles, base), base);
-    std::vector<RankedCause> larger(worth.size());
-    markov::parallel_for(worth.size(), problem.threads, [&](std::size_t i) {
+  const double pair_evidence = pair->evidence;
+  std::vector<RankedCause> bases = strongest_of(pairs, most_extended);
+  while (bases.front().terms.size() < problem.effort.most_effects) {
+    const double before = bases.front().evidence;
+    std::vector<RankedCause> larger;
+    for (const RankedCause& base : bases) {
       problem.heartbeat();
-      larger[i] = with_one_more(problem, singles, base, worth[i]);
-    });
-    std::erase_if(larger, [](const RankedCause& one) { return !std::isfinite(one.evidence); });
-    bound_by_parts(problem, base.terms.size() == 2 ? pairs : sets, larger);
-    const RankedCause* best = best_of(larger);
-    if (!best || best->evidence < base.evidence) {
-      std::ranges::move(larger, std::back_inserter(sets));
-      break;
+      extend(problem, singles, base, std::max(before, singles.top), larger);
     }
-    if (base.terms.size() == 2) add_pairs_within(problem, singles, *best, pairs);
-    base = *best;
+    bound_by_parts(problem, singles, bases.front().terms.size() == 2 ? pairs : sets, larger);
+    bases = strongest_of(larger, 1);
     std::ranges::move(larger, std::back_inserter(sets));
+    if (bases.empty() || bases.front().evidence < before) break;
+    if (bases.front().terms.size() == 3) add_pairs_within(problem, singles, bases.front(), pairs);
   }
+  if (const RankedCause* best = best_of(sets); best && best->evidence > pair_evidence)
+    add_swaps(problem, singles, pairs, sets);
   return sets;
 }
 
-void bound_by_parts(const RankingProblem& problem, const std::vector<RankedCause>& parts,
+void bound_by_parts(const RankingProblem& problem, const SingleEffects& singles, const std::vector<RankedCause>& parts,
                     std::vector<RankedCause>& sets) {
   for (RankedCause& set : sets)
-    for (const EffectTerm& term : set.terms) {
+    for (const EffectTerm& last : set.terms) {
       std::vector<EffectTerm> others = set.terms;
-      std::erase_if(others, [&](const EffectTerm& one) { return one.candidate == term.candidate; });
+      std::erase_if(others, [&](const EffectTerm& one) { return one.candidate == last.candidate; });
       const auto part = find_set(parts, others);
       if (part == parts.end() || !part->fitted() || !std::isfinite(part->evidence)) continue;
-      const double beyond = set.gain - part->gain;
-      if (beyond > hardly_more) continue;
-      const auto parameters = static_cast<double>(term.candidate->parameters.size());
+      const double beyond = earned(problem.model, set.fit, part->fit,
+                                   exact_part(singles.causes, part->terms, problem.recalibrated), problem.rules);
       set.evidence =
-          std::min(set.evidence, part->evidence + evidence_of_gain(std::max(0.0, beyond), parameters, problem.rules) +
+          std::min(set.evidence, part->evidence + evidence_of_last(problem, singles, last.candidate, beyond) +
                                      log_prior_of_one_more(problem, set.terms.size()));
     }
 }

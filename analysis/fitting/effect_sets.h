@@ -9,6 +9,10 @@
 
 namespace metastable::analysis {
 
+/// Evidence promised below that of the best one in an effect's place, for an effect worth fitting there. This saves
+/// time.
+inline constexpr double alike_margin = 4;
+
 /// Returns the log prior odds of a set of effects to the same without its last one, any of the others in its place.
 /// @param size  effects of the set, >= 2
 double log_prior_of_one_more(const RankingProblem& problem, std::size_t size);
@@ -33,17 +37,18 @@ double measure_last(const RankingProblem& problem, const SingleEffects& singles,
 double gain_together(const RankingProblem& problem, const SingleEffects& singles, const RankedCause& set);
 
 /// Extends the best pair, one effect after the other, as long as the last one earns its place, up to
-/// Effort::most_effects. A set of three shows pairs, too: what stays of it without one of the first two.
+/// Effort::most_effects, and puts others in the place of each effect of the best set. A set of three shows pairs, too:
+/// what stays of it without one of the first two.
 /// @param pairs  gets pairs that a larger set came upon
 /// @return sets of three and more
 std::vector<RankedCause> rank_larger_sets(const RankingProblem& problem, const SingleEffects& singles,
                                           std::vector<RankedCause>& pairs);
 
-/// Bounds the evidence of sets by the same without one effect. Evidence shrinks gains by the number of parameters:
-/// eight leg lengths, which take in an eccentric hub, would count for less than the hub with them beside it. A set that
-/// gains nothing beyond a part of it is that part.
+/// Bounds the evidence of sets by what each effect, taken as the last one, earns beyond the same without it: the order
+/// that says least decides, whichever came first in the search. A set that gains nothing beyond a part of it is that
+/// part.
 /// @param parts  hypotheses of one effect less among them; may be `sets`
-void bound_by_parts(const RankingProblem& problem, const std::vector<RankedCause>& parts,
+void bound_by_parts(const RankingProblem& problem, const SingleEffects& singles, const std::vector<RankedCause>& parts,
                     std::vector<RankedCause>& sets);
 
 }  // namespace metastable::analysis

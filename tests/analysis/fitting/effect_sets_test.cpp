@@ -9,6 +9,7 @@
 #include <string>
 #include <vector>
 
+#include "analysis/fitting/bayes_factor.h"
 #include "analysis/fitting/cause_ranking.h"
 #include "tests/analysis/line.h"
 
@@ -35,7 +36,8 @@ class Waves : public Line {
     Evaluation e = Line::evaluate(n, {});
     for (std::size_t i = 0; i < e.score.size(); ++i) {
       for (const EffectTerm& term : terms)
-        e.score[i] -= term.values[0] / std::exp(n[1]) * at(static_cast<std::size_t>(term.candidate->id.back() - '0'), i);
+        e.score[i] -=
+            term.values[0] / std::exp(n[1]) * at(static_cast<std::size_t>(term.candidate->id.back() - '0'), i);
       e.log_density[i] = -0.5 * e.score[i] * e.score[i] - 0.91893853320467274 - n[1];
     }
     return e;
@@ -78,6 +80,54 @@ TEST(EffectSets, IndependentEffectsGainTogetherWhatTheyGainAlone) {
   const CauseRanking ranking = ranked(Waves(line(0, 1, 2400), 3));
   ASSERT_FALSE(ranking.sets.empty());
   for (const RankedCause& set : ranking.sets) EXPECT_NEAR(set.together, 1, 0.1) << set.terms.size();
+}
+
+// A line with the waves 0, 1 and 2, of which wave 5 is nearly wave 0.
+class AlikeWaves : public Waves {
+ public:
+  using Waves::Waves;
+  Evaluation evaluate(std::span<const double> n, std::span<const EffectTerm> terms) const override {
+    std::vector<EffectTerm> seen(terms.begin(), terms.end());
+    for (std::size_t k = 0; k < terms.size(); ++k)
+      if (terms[k].candidate->id == "wave 5") {
+        EffectTerm most = terms[k];
+        most.candidate = &candidates_[0];
+        most.values[0] *= 0.98;
+        seen[k].values[0] *= 0.2;
+        seen.push_back(std::move(most));
+      }
+    return Waves::evaluate(n, seen);
+  }
+};
+
+// The two are told apart by a gain of four, so that both may be the one at work, whichever the search met first.
+TEST(EffectSets, HoldWhatActsLikeOneOfThem) {
+  const AlikeWaves model(line(0, 1, 2400), 3);
+  const CauseRanking ranking = ranked(model);
+  const auto evidence = [&](const std::set<std::string>& wanted) {
+    for (const RankedCause& set : ranking.sets) {
+      std::set<std::string> ids;
+      for (const EffectTerm& term : set.terms) ids.insert(term.candidate->id);
+      if (ids == wanted) return set.evidence;
+    }
+    ADD_FAILURE() << "a set was not tried";
+    return 0.0;
+  };
+  EXPECT_NEAR(evidence({"wave 0", "wave 1", "wave 2"}), evidence({"wave 5", "wave 1", "wave 2"}), 6);
+}
+
+// The order in which the search met two effects does not decide what the pair is worth.
+TEST(EffectSets, AreWorthNoMoreThanTheirPartsAndWhatTheOtherEarns) {
+  const AlikeWaves model(line(0, 1, 2400), 3);
+  const CauseRanking ranking = ranked(model);
+  ASSERT_FALSE(ranking.pairs.empty());
+  for (const RankedCause& pair : ranking.pairs)
+    for (const EffectTerm& first : pair.terms)
+      for (const RankedCause& single : ranking.singles)
+        if (single.terms[0].candidate == first.candidate && single.fitted()) {
+          EXPECT_LE(pair.evidence, single.evidence + evidence_of_gain(pair.gain - single.gain, 1, Rules{}) +
+                                       std::log(0.05 / 2.5) + 1e-9);
+        }
 }
 
 // One more effect is as likely as the rule says, whichever of the others it is.
