@@ -2,6 +2,9 @@
 
 #include <algorithm>
 #include <cmath>
+#include <deque>
+#include <iterator>
+#include <optional>
 #include <utility>
 
 #include "analysis/statistics/falling_order.h"
@@ -73,6 +76,84 @@ std::vector<std::pair<std::string, double>> alike_to(const EffectScan& scan, con
   return alike;
 }
 
+// This number saves the user trouble: a further change must tell so many times more.
+constexpr double worth_a_change = 1.25;
+
+// Two hypotheses that have effects in common and one each of their own.
+struct Swap {
+  std::vector<EffectTerm> common;
+  EffectTerm own, other;
+};
+
+std::optional<Swap> swap_of(const std::vector<EffectTerm>& cause, const std::vector<EffectTerm>& rival) {
+  if (cause.size() != rival.size()) return std::nullopt;
+  const auto is_in = [](const std::vector<EffectTerm>& terms, const EffectTerm& one) {
+    return std::ranges::find(terms, one.candidate, &EffectTerm::candidate) != terms.end();
+  };
+  Swap swap;
+  for (const EffectTerm& term : cause) {
+    if (is_in(rival, term))
+      swap.common.push_back(term);
+    else
+      swap.own = term;
+  }
+  for (const EffectTerm& term : rival)
+    if (!is_in(cause, term)) swap.other = term;
+  const bool one_each =
+      swap.common.size() + 1 == cause.size() && !swap.own.values.empty() && !swap.other.values.empty();
+  return one_each ? std::optional(std::move(swap)) : std::nullopt;
+}
+
+// All that the hypotheses of some swaps have beside what they share.
+struct AtIssue {
+  std::vector<EffectTerm> shared;       // by all of them
+  std::deque<Candidate> candidates;     // with the one variant that was fitted
+  std::vector<const Candidate*> known;  // whose they are, in the same order
+};
+
+AtIssue at_issue(const Fit& cause, const std::vector<Swap>& swaps) {
+  AtIssue all;
+  const auto add = [&](const EffectTerm& term) {
+    if (std::ranges::find(all.known, term.candidate) != all.known.end()) return;
+    all.known.push_back(term.candidate);
+    all.candidates.push_back(*term.candidate);
+    all.candidates.back().variants = {term.variant};
+  };
+  for (const EffectTerm& term : cause.terms)
+    if (std::ranges::any_of(swaps, [&](const Swap& swap) { return swap.own.candidate == term.candidate; }))
+      add(term);
+    else
+      all.shared.push_back(term);
+  for (const Swap& swap : swaps) add(swap.other);
+  return all;
+}
+
+// Lists the columns of a scan that a term has.
+std::vector<Eigen::Index> columns_of(const AtIssue& issue, const EffectScan& scan, const EffectTerm& term) {
+  const auto at = std::ranges::find(issue.known, term.candidate) - issue.known.begin();
+  std::vector<Eigen::Index> columns;
+  if (const ScannedEffect* scanned = scan.find(&issue.candidates[static_cast<std::size_t>(at)]))
+    for (std::size_t p = 0; p < term.values.size(); ++p)
+      columns.push_back(scanned->first[0] + static_cast<Eigen::Index>(p));
+  return columns;
+}
+
+// Returns 2 Delta log likelihood to be expected between the two of a swap, at the size of the first one's own.
+double separation(const AtIssue& issue, const EffectScan& scan, const Swap& swap) {
+  const std::vector<Eigen::Index> own = columns_of(issue, scan, swap.own);
+  std::vector<Eigen::Index> others = columns_of(issue, scan, swap.other);
+  if (own.empty() || others.empty()) return 0;
+  for (const EffectTerm& term : swap.common)
+    if (std::ranges::find(issue.known, term.candidate) != issue.known.end())
+      for (const Eigen::Index column : columns_of(issue, scan, term)) others.push_back(column);
+  Eigen::VectorXd size(static_cast<Eigen::Index>(own.size()));
+  for (std::size_t p = 0; p < own.size(); ++p)
+    size[static_cast<Eigen::Index>(p)] = swap.own.values[p] - swap.own.candidate->parameters[p].neutral;
+  const Eigen::VectorXd cross = scan.information(others, own) * size, whole = scan.whole(others);
+  const Eigen::MatrixXd root = markov::resolved_root(scan.information(others, others), whole, resolved_share);
+  return std::max(0.0, size.dot(scan.information(own, own) * size) - (root.transpose() * cross).squaredNorm());
+}
+
 }  // namespace
 
 std::vector<Detectability> detectability(const EffectScan& scan, const std::vector<const Candidate*>& candidates,
@@ -102,32 +183,49 @@ std::vector<Detectability> detectability(const EffectScan& scan, const std::vect
 }
 
 std::vector<NextExperiment> next_experiments(const TransitionModel& model, const Fit& cause,
-                                             const std::vector<EffectTerm>& rival, int threads, std::uint64_t seed) {
+                                             const std::vector<std::vector<EffectTerm>>& rivals, const Rules& rules,
+                                             int threads, std::uint64_t seed) {
+  std::vector<Swap> swaps;
+  for (const std::vector<EffectTerm>& rival : rivals)
+    if (std::optional<Swap> swap = swap_of(cause.terms, rival)) swaps.push_back(std::move(*swap));
   std::vector<NextExperiment> all;
-  if (cause.terms.size() != 1 || rival.size() != 1 || cause.terms[0].values.empty() || rival[0].values.empty())
-    return all;
-  auto alternatives = model.alternatives(cause.nuisance, seed);
-  all.resize(alternatives.size());
-  markov::parallel_for(alternatives.size(), threads, [&](std::size_t i) {
-    const TransitionModel& changed = *alternatives[i].second;
-    all[i].change = alternatives[i].first;
-    const Fit plain = fit(changed, cause.nuisance, {});
-    // The same effects stand in the changed experiment, with the one variant that was fitted.
-    Candidate first = *cause.terms[0].candidate, second = *rival[0].candidate;
-    first.variants = {cause.terms[0].variant};
-    second.variants = {rival[0].variant};
-    const EffectScan scan = scan_effects(changed, plain, {&first, &second}, 1);
-    if (scan.effects.size() != 2) return;
-    const auto n = static_cast<Eigen::Index>(first.parameters.size());
-    const auto m = static_cast<Eigen::Index>(second.parameters.size());
-    Eigen::VectorXd size(n);
-    for (Eigen::Index p = 0; p < n; ++p)
-      size[p] =
-          cause.terms[0].values[static_cast<std::size_t>(p)] - first.parameters[static_cast<std::size_t>(p)].neutral;
-    const Eigen::VectorXd cross = scan.information.block(n, 0, m, n) * size;
-    all[i].separation =
-        std::max(0.0, size.dot(scan.information.block(0, 0, n, n) * size) - taken_up(scan, n, m, cross));
-  });
+  if (swaps.empty()) return all;
+  const AtIssue issue = at_issue(cause, swaps);
+  std::vector<const Candidate*> scanned;
+  for (const Candidate& candidate : issue.candidates) scanned.push_back(&candidate);
+  std::vector<ChangedExperiment> designs = model.alternatives(cause.nuisance, issue.shared, seed);
+  NextExperiment base;
+  while (!designs.empty()) {
+    std::vector<NextExperiment> weighed(designs.size());
+    markov::parallel_for(designs.size(), threads, [&](std::size_t i) {
+      NextExperiment& one = weighed[i];
+      one = base;
+      one.change += (base.change.empty() ? "" : " and ") + designs[i].words;
+      if (!designs[i].kind.empty()) one.changes.emplace_back(designs[i].kind, designs[i].amount);
+      one.separation = 0;
+      // The data were drawn at this fit's start: one step takes up what their noise moves.
+      const Fit shared = fit(*designs[i].model, cause.nuisance, issue.shared,
+                             {.count = {}, .refit_nuisances = true, .most_iterations = 1});
+      const EffectScan scan = scan_effects(*designs[i].model, shared, scanned, 1);
+      for (const Swap& swap : swaps)
+        one.separation += std::min(rules.seen_gain, separation(issue, scan, swap)) / static_cast<double>(swaps.size());
+    });
+    const auto best = std::ranges::max_element(weighed, {}, &NextExperiment::separation);
+    if (best == weighed.end()) break;
+    const bool pays = !best->changes.empty() && best->separation > worth_a_change * base.separation;
+    std::vector<ChangedExperiment> further;
+    if (pays) {
+      base = *best;
+      further = designs[static_cast<std::size_t>(best - weighed.begin())].model->alternatives(cause.nuisance,
+                                                                                              issue.shared, seed);
+      std::erase_if(further, [&](const ChangedExperiment& one) {
+        return one.kind.empty() ||
+               std::ranges::find(base.changes, one.kind, &std::pair<std::string, double>::first) != base.changes.end();
+      });
+    }
+    std::ranges::move(weighed, std::back_inserter(all));
+    designs = std::move(further);
+  }
   std::vector<double> separations;
   for (const NextExperiment& one : all) separations.push_back(one.separation);
   std::vector<NextExperiment> ranked;

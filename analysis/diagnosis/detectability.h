@@ -15,9 +15,12 @@ namespace metastable::analysis {
 std::vector<Detectability> detectability(const EffectScan& scan, const std::vector<const Candidate*>& candidates,
                                          const Rules& rules);
 
-/// Ranks changes of the experiment (TransitionModel::alternatives) by what they would tell between the fitted cause and
-/// its rival, best first: the gain of the fitted size that the rival and the nuisances cannot take up.
+/// Ranks changed experiments (TransitionModel::alternatives), and several changes of the best one together, by what
+/// they would tell between the fitted cause and its rivals, best first: the gain of the fitted size that a rival, the
+/// effects that both have and the nuisances cannot take up.
+/// @param rivals  hypotheses; those count that have another effect in the place of one of the cause's
 std::vector<NextExperiment> next_experiments(const TransitionModel& model, const Fit& cause,
-                                             const std::vector<EffectTerm>& rival, int threads, std::uint64_t seed);
+                                             const std::vector<std::vector<EffectTerm>>& rivals, const Rules& rules,
+                                             int threads, std::uint64_t seed);
 
 }  // namespace metastable::analysis

@@ -61,6 +61,15 @@ std::vector<WeighedFit> telling(const std::vector<const RankedCause*>& ordered, 
   return fits;
 }
 
+// Lists the effects of the hypotheses of the set beside the first.
+std::vector<std::vector<EffectTerm>> rivals(const std::vector<const RankedCause*>& ordered, const Diagnosis& d) {
+  std::vector<std::vector<EffectTerm>> all;
+  for (std::size_t i = 1; i < ordered.size(); ++i)
+    if (ordered[i]->fitted() && std::ranges::find(d.causes.set, d.causes.ranked[i].name()) != d.causes.set.end())
+      all.push_back(ordered[i]->terms);
+  return all;
+}
+
 // Returns the place that was asked about, if one was.
 Elsewhere asked_elsewhere(const TransitionModel& model, const DiagnosisOptions& options) {
   return options.elsewhere.empty() ? Elsewhere{} : model.elsewhere(options.elsewhere);
@@ -412,8 +421,8 @@ Diagnosis answer(const TransitionModel& model, const Fitted& fitted, const std::
   progress(0.93, "what could not be seen");
   d.limits.missing = missing_columns(model, fitted.recalibrated, candidates, d.rules, options.threads, options.seed);
   d.limits.not_possible = not_possible(model, d, options);
-  if (d.verdict == Verdict::explained && d.causes.set.size() > 1 && ordered.size() > 1)
-    d.limits.next = next_experiments(model, best->fit, ordered[1]->terms, options.threads, options.seed);
+  if (d.causes.set.size() > 1 && best)
+    d.limits.next = next_experiments(model, best->fit, rivals(ordered, d), d.rules, options.threads, options.seed);
   progress(1, "done");
   d.sentences = sentences(d);
   return std::move(d);

@@ -129,8 +129,11 @@ struct MissingColumn {
 
 /// An experiment that would tell the remaining causes apart.
 struct NextExperiment {
-  std::string change;
-  double separation = 0;  ///< 2 Delta log likelihood expected between the two leading causes, at the fitted size
+  std::string change;                                   ///< in words
+  std::vector<std::pair<std::string, double>> changes;  ///< ChangedExperiment::kind and amount; none: the same
+  /// 2 Delta log likelihood expected between the first cause, at the fitted size, and the others, on average; each
+  /// counts up to Rules::seen_gain.
+  double separation = 0;
 };
 
 /// Holds the answer for one experiment.

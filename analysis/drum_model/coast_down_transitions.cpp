@@ -112,8 +112,8 @@ class CoastDownTransitions : public TransitionModel {
   Evaluation evaluate(std::span<const double> nuisance, std::span<const EffectTerm> terms) const override;
   std::unique_ptr<TransitionModel> simulate(std::span<const double> nuisance, std::span<const EffectTerm> terms,
                                             std::uint64_t seed) const override;
-  std::vector<std::pair<std::string, std::unique_ptr<TransitionModel>>> alternatives(std::span<const double> nuisance,
-                                                                                     std::uint64_t seed) const override;
+  std::vector<ChangedExperiment> alternatives(std::span<const double> nuisance, std::span<const EffectTerm> terms,
+                                              std::uint64_t seed) const override;
   std::pair<double, double> rests() const override { return {0, 0}; }
   double expected_steps(std::span<const double>, std::span<const EffectTerm>, std::uint64_t) const override {
     return std::numeric_limits<double>::infinity();  // a drum does not fail by a step
@@ -560,16 +560,17 @@ std::unique_ptr<TransitionModel> CoastDownTransitions::simulate(std::span<const 
   return copy;
 }
 
-std::vector<std::pair<std::string, std::unique_ptr<TransitionModel>>> CoastDownTransitions::alternatives(
-    std::span<const double> nuisance, std::uint64_t seed) const {
-  std::vector<std::pair<std::string, std::unique_ptr<TransitionModel>>> all;
-  all.emplace_back("the same experiment once more", simulate(nuisance, {}, seed));
+std::vector<ChangedExperiment> CoastDownTransitions::alternatives(std::span<const double> nuisance,
+                                                                  std::span<const EffectTerm> terms,
+                                                                  std::uint64_t seed) const {
+  std::vector<ChangedExperiment> all;
+  all.push_back({"", 0, "the same experiment once more", simulate(nuisance, terms, seed)});
   for (const double by : {0.5, 1.5}) {
     CoastDownTransitions changed = *this;
     for (auto& speeds : changed.speeds_)
       for (double& speed : speeds) speed *= by;
-    all.emplace_back(by < 1 ? "runs at half the speed" : "runs at one and a half times the speed",
-                     changed.simulate(nuisance, {}, seed));
+    all.push_back({"speed_times", by, by < 1 ? "runs at half the speed" : "runs at one and a half times the speed",
+                   changed.simulate(nuisance, terms, seed)});
   }
   return all;
 }

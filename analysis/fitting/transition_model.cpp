@@ -52,6 +52,11 @@ const std::vector<Variation>& TransitionModel::variations() const {
   return none;
 }
 
+std::vector<ChangedExperiment> TransitionModel::alternatives(std::span<const double>, std::span<const EffectTerm>,
+                                                             std::uint64_t) const {
+  return {};
+}
+
 std::pair<std::string, std::unique_ptr<TransitionModel>> TransitionModel::elsewhere(
     const std::vector<NamedValue>& place) const {
   throw std::invalid_argument(

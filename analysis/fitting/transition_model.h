@@ -144,6 +144,16 @@ struct FitStart {
   std::vector<std::vector<double>> values;  ///< by term
 };
 
+class TransitionModel;
+
+/// An experiment that differs from the one at hand in one thing.
+struct ChangedExperiment {
+  std::string kind;                        ///< what differs, in the words of a key ("slope_deg_by"); empty: nothing
+  double amount = 0;                       ///< by how much, in the unit of the kind
+  std::string words;                       ///< "slopes flatter by 2 deg"
+  std::unique_ptr<TransitionModel> model;  ///< with data drawn
+};
+
 class TransitionModel {
  public:
   virtual ~TransitionModel() = default;
@@ -196,10 +206,10 @@ class TransitionModel {
   /// same data.
   virtual std::unique_ptr<TransitionModel> simulate(std::span<const double> nuisance, std::span<const EffectTerm> terms,
                                                     std::uint64_t seed) const = 0;
-  /// Describes changed experiments in words, each with data drawn from the model without effects: another slope or
-  /// launch speed, more columns, more trials.
-  virtual std::vector<std::pair<std::string, std::unique_ptr<TransitionModel>>> alternatives(
-      std::span<const double> nuisance, std::uint64_t seed) const = 0;
+  /// Lists changed experiments, each with data drawn from the model with these effects: the same once more, first, then
+  /// another slope or launch, more columns, longer trials. The default lists none.
+  virtual std::vector<ChangedExperiment> alternatives(std::span<const double> nuisance,
+                                                      std::span<const EffectTerm> terms, std::uint64_t seed) const;
   /// Returns the same design at another place, by the names of what differs there (a slope, a launch), for its expected
   /// steps alone, and says in words where that is. The default knows none.
   /// @throws std::invalid_argument for a name that this system does not have, or a value out of its range

@@ -79,10 +79,10 @@ class MachineTransitions : public TransitionModel {
                                             std::uint64_t seed) const override {
     return drawn(nuisance, terms, seed);
   }
-  std::vector<std::pair<std::string, std::unique_ptr<TransitionModel>>> alternatives(
-      std::span<const double> nuisance, std::uint64_t seed) const override {
-    std::vector<std::pair<std::string, std::unique_ptr<TransitionModel>>> all;
-    all.emplace_back("the same experiment once more", drawn(nuisance, {}, seed));
+  std::vector<ChangedExperiment> alternatives(std::span<const double> nuisance, std::span<const EffectTerm> terms,
+                                              std::uint64_t seed) const override {
+    std::vector<ChangedExperiment> all;
+    all.push_back({"", 0, "the same experiment once more", drawn(nuisance, terms, seed)});
     return all;
   }
   std::pair<double, double> rests() const override {

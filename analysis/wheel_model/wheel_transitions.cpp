@@ -96,8 +96,8 @@ class WheelTransitions : public TransitionModel {
   std::vector<double> rest_chances(std::span<const double> nuisance, std::span<const EffectTerm> terms) const override;
   std::unique_ptr<TransitionModel> simulate(std::span<const double> nuisance, std::span<const EffectTerm> terms,
                                             std::uint64_t seed) const override;
-  std::vector<std::pair<std::string, std::unique_ptr<TransitionModel>>> alternatives(std::span<const double> nuisance,
-                                                                                     std::uint64_t seed) const override;
+  std::vector<ChangedExperiment> alternatives(std::span<const double> nuisance, std::span<const EffectTerm> terms,
+                                              std::uint64_t seed) const override;
   std::pair<std::string, std::unique_ptr<TransitionModel>> elsewhere(
       const std::vector<NamedValue>& place) const override;
   std::vector<std::pair<std::string, std::unique_ptr<TransitionModel>>> completed(std::span<const double> nuisance,
@@ -275,38 +275,42 @@ std::unique_ptr<TransitionModel> WheelTransitions::simulate(std::span<const doub
   return copy;
 }
 
-std::vector<std::pair<std::string, std::unique_ptr<TransitionModel>>> WheelTransitions::alternatives(
-    std::span<const double> nuisance, std::uint64_t seed) const {
-  std::vector<std::pair<std::string, std::unique_ptr<TransitionModel>>> all;
-  const auto add = [&](std::string words, const std::function<void(WheelTransitions&)>& change) {
+std::vector<ChangedExperiment> WheelTransitions::alternatives(std::span<const double> nuisance,
+                                                              std::span<const EffectTerm> terms,
+                                                              std::uint64_t seed) const {
+  std::vector<ChangedExperiment> all;
+  const auto add = [&](std::string kind, double amount, std::string words,
+                       const std::function<void(WheelTransitions&)>& change) {
     WheelTransitions changed = *this;
     change(changed);
-    all.emplace_back(std::move(words), changed.simulate(nuisance, {}, seed));
+    all.push_back({std::move(kind), amount, std::move(words), changed.simulate(nuisance, terms, seed)});
   };
-  add("the same experiment once more", [](WheelTransitions&) {});
+  add("", 0, "the same experiment once more", [](WheelTransitions&) {});
   const double steepest = dynamics::steepest_slope(measured_.wheel.legs()) * 180 / std::numbers::pi;
-  for (const double by : {-2.0, 2.0})
+  for (const double by : {-4.0, -2.0, 2.0, 4.0})
     if (std::all_of(measured_.conditions.begin(), measured_.conditions.end(),
                     [&](const Condition& c) { return c.slope_deg + by > 1 && c.slope_deg + by < steepest; }))
-      add(fmt::format("slopes {} by 2 deg", by < 0 ? "flatter" : "steeper"), [by](WheelTransitions& w) {
-        for (Condition& c : w.measured_.conditions) c.slope_deg += by;
-        tabulate_landings(w.measured_);
-      });
-  for (const double by : {-1.0, 1.0})
-    add(fmt::format("launches {} by 1 rad/s", by < 0 ? "slower" : "faster"), [by](WheelTransitions& w) {
-      for (Condition& c : w.measured_.conditions)
-        if (c.initial_speed) c.initial_speed->mean = std::max(1.0, c.initial_speed->mean + by);
-      for (WheelRun& run : w.measured_.runs)
-        run.collisions.front().before = std::max(1.0, run.collisions.front().before + by);
-    });
+      add("slope_deg_by", by, fmt::format("slopes {} by {:g} deg", by < 0 ? "flatter" : "steeper", std::abs(by)),
+          [by](WheelTransitions& w) {
+            for (Condition& c : w.measured_.conditions) c.slope_deg += by;
+            tabulate_landings(w.measured_);
+          });
+  for (const double by : {-2.0, 2.0})
+    add("launch_rad_s_by", by, fmt::format("launches {} by {:g} rad/s", by < 0 ? "slower" : "faster", std::abs(by)),
+        [by](WheelTransitions& w) {
+          for (Condition& c : w.measured_.conditions)
+            if (c.initial_speed) c.initial_speed->mean = std::max(1.0, c.initial_speed->mean + by);
+          for (WheelRun& run : w.measured_.runs)
+            run.collisions.front().before = std::max(1.0, run.collisions.front().before + by);
+        });
   if (!measured_.speeds_after)
-    add("the speed after each collision measured as well", [](WheelTransitions& w) {
+    add("speeds_after", 1, "the speed after each collision measured as well", [](WheelTransitions& w) {
       w.measured_.speeds_after = true;
       w.measured_.noise = std::max(w.measured_.noise, imagined_noise);
       for (WheelRun& run : w.measured_.runs)
         for (RunCollision& m : run.collisions) m.after = m.before;  // a value to be drawn anew
     });
-  add("trials of twice as many collisions", [](WheelTransitions& w) {
+  add("collisions_times", 2, "trials of twice as many collisions", [](WheelTransitions& w) {
     for (WheelRun& run : w.measured_.runs) {
       const auto count = run.collisions.size();
       run.collisions.resize(2 * count, run.collisions.back());

@@ -281,7 +281,9 @@ std::string diagnosis_json(const analysis::Diagnosis& d, const Provenance& prove
         {"statement", n.statement}, {"because", n.because}, {"trials", n.trials ? Json(*n.trials) : Json(nullptr)}};
   });
   json["next_experiment"] = list_json(d.limits.next, [](const analysis::NextExperiment& next) {
-    return Json{{"change", next.change}, {"separation", number(next.separation)}};
+    Json changes = Json::object();
+    for (const auto& [kind, amount] : next.changes) changes[kind] = number(amount);
+    return Json{{"change", next.change}, {"changes", changes}, {"separation", number(next.separation)}};
   });
   json["data"] = {{"trials", d.data.trials}, {"collisions", d.data.collisions}, {"transitions", d.data.events}};
   json["notes"] = d.data.notes;

@@ -377,12 +377,14 @@ Table undecided_table(const Diagnosis& d) {
 }
 
 Table next_table(const Diagnosis& d) {
-  Table table{.id = "next-experiment",
-              .title = "The next experiment",
-              .notes = {fmt::format("Separation: 2 Δ ln L to be expected between the two leading causes, at the fitted "
-                                    "size; from {:.0f} on most experiments like it tell them apart.",
-                                    d.rules.seen_gain)},
-              .columns = {{"change"}, {"separation"}}};
+  Table table{
+      .id = "next-experiment",
+      .title = "The next experiment",
+      .notes = {fmt::format("Separation: 2 Δ ln L to be expected between the first cause, at the fitted size, and "
+                            "the others, on average, each counted up to {:.0f}, from where on most experiments "
+                            "like it tell two apart.",
+                            d.rules.seen_gain)},
+      .columns = {{"change"}, {"separation"}}};
   for (const analysis::NextExperiment& n : d.limits.next) table.rows.push_back({n.change, known_cell(n.separation)});
   return table;
 }

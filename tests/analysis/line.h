@@ -65,10 +65,6 @@ class Line : public TransitionModel {
                                             std::uint64_t) const override {
     return std::make_unique<Line>(*this);
   }
-  std::vector<std::pair<std::string, std::unique_ptr<TransitionModel>>> alternatives(std::span<const double>,
-                                                                                     std::uint64_t) const override {
-    return {};
-  }
   std::pair<double, double> rests() const override { return {0, 0}; }
   double expected_steps(std::span<const double>, std::span<const EffectTerm>, std::uint64_t) const override {
     return 1;

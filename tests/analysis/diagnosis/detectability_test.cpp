@@ -92,11 +92,11 @@ class Plane : public test::Line {
     }
     return e;
   }
-  std::vector<std::pair<std::string, std::unique_ptr<TransitionModel>>> alternatives(std::span<const double>,
-                                                                                     std::uint64_t) const override {
-    std::vector<std::pair<std::string, std::unique_ptr<TransitionModel>>> all;
+  std::vector<ChangedExperiment> alternatives(std::span<const double>, std::span<const EffectTerm>,
+                                              std::uint64_t) const override {
+    std::vector<ChangedExperiment> all;
     for (const auto& [words, correlation] : {std::pair{"alike", 0.95}, {"apart", 0.0}, {"nearly apart", 0.5}})
-      all.emplace_back(words, std::make_unique<Plane>(correlation, 31));
+      all.push_back({"correlation", correlation, words, std::make_unique<Plane>(correlation, 31)});
     return all;
   }
   const std::vector<double>& v() const { return v_; }
@@ -146,7 +146,9 @@ TEST(NextExperiment, SeparatesByWhatTheRivalCannotTakeUp) {
   Fit cause = fit(model, {0, std::log(0.5)}, {});
   cause.terms = {{&model.candidates()[0], {}, {size}}};
   const std::vector<EffectTerm> rival{{&model.candidates()[1], {}, {size}}};
-  const std::vector<NextExperiment> next = next_experiments(model, cause, rival, 1, 1);
+  Rules unbounded;
+  unbounded.seen_gain = 1e9;
+  const std::vector<NextExperiment> next = next_experiments(model, cause, {rival}, unbounded, 1, 1);
   ASSERT_EQ(next.size(), 3U);
   EXPECT_EQ(next[0].change, "apart");
   EXPECT_EQ(next[1].change, "nearly apart");
@@ -163,9 +165,9 @@ TEST(NextExperiment, SeparatesByWhatTheRivalCannotTakeUp) {
 TEST(NextExperiment, NeedsTwoEffectsWithASize) {
   const Plane model(0.5, 11);
   Fit cause = fit(model, {0, std::log(0.5)}, {});
-  EXPECT_TRUE(next_experiments(model, cause, {{&model.candidates()[1], {}, {0.3}}}, 1, 1).empty());
+  EXPECT_TRUE(next_experiments(model, cause, {{{&model.candidates()[1], {}, {0.3}}}}, {}, 1, 1).empty());
   cause.terms = {{&model.candidates()[0], {}, {0.3}}};
-  EXPECT_TRUE(next_experiments(model, cause, {{&model.candidates()[1], {}, {}}}, 1, 1).empty());
+  EXPECT_TRUE(next_experiments(model, cause, {{{&model.candidates()[1], {}, {}}}}, {}, 1, 1).empty());
 }
 
 }  // namespace

@@ -112,9 +112,9 @@ class Jagged : public TransitionModel {
                                             std::uint64_t seed) const override {
     return model_->simulate(nuisance, terms, seed);
   }
-  std::vector<std::pair<std::string, std::unique_ptr<TransitionModel>>> alternatives(
-      std::span<const double> nuisance, std::uint64_t seed) const override {
-    return model_->alternatives(nuisance, seed);
+  std::vector<ChangedExperiment> alternatives(std::span<const double> nuisance, std::span<const EffectTerm> terms,
+                                              std::uint64_t seed) const override {
+    return model_->alternatives(nuisance, terms, seed);
   }
   std::pair<double, double> rests() const override { return model_->rests(); }
   double expected_steps(std::span<const double> nuisance, std::span<const EffectTerm> terms,

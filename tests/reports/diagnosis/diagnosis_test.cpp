@@ -80,7 +80,7 @@ analysis::Diagnosis sample() {
                       {"sensor_noise", "sd_rad_s", 0, {}, "no noise is stated"}};
   d.limits.missing = {{"leg", {{"leg_contact", "friction_ratio", {}, 0.04, {"friction_patch"}}}}, {"position_m", {}}};
   d.limits.not_possible = {{"where the gap lies", "7 transitions of a speed; a cell of the map takes 20", 3, true}};
-  d.limits.next = {{"slope 8.5 deg", 21.5}};
+  d.limits.next = {{"slopes flatter by 2 deg", {{"slope_deg_by", -2}}, 21.5}};
   d.data.condition_names = {"fast"};
   for (int k = 1; k <= 3; ++k)
     d.shrinkage.profile.push_back({.condition = 0,
@@ -119,6 +119,7 @@ TEST(DiagnosisJson, HasTheKeysOfTheSchema) {
   EXPECT_EQ(json.at("missing_columns").at(0).at("effects").at(0).at("not_told_from").at(0), "friction_patch");
   EXPECT_EQ(json.at("not_possible").at(0).at("trials"), 3);
   EXPECT_EQ(json.at("next_experiment").at(0).at("separation"), 21.5);
+  EXPECT_EQ(json.at("next_experiment").at(0).at("changes").at("slope_deg_by"), -2);
   EXPECT_EQ(json.at("visibility").at(0).at("alike").at("leg_lengths"), 0.7);
   EXPECT_EQ(json.at("provenance").at("seed"), 7);
 }
