@@ -397,6 +397,21 @@ Decided decide(const TransitionModel& model, const Fitted& fitted, const std::ve
   return decided;
 }
 
+// Doubts effects that close no more, as the last, than what stays without a name: what takes that shape may take theirs.
+void doubt_lesser_effects(Diagnosis& d) {
+  std::map<std::string, double> doubted;
+  for (const AtWork& one : d.causes.at_work)
+    if (one.closes_beside && one.closes_beside->value <= 1 - *d.shrinkage.measures.front().closed)
+      for (const std::string& effect : one.effects) doubted[effect] = 1 / (1 + Rules::even_odds);
+  if (doubted.empty()) return;
+  Named named = corrected({d.verdict, d.causes.set, d.causes.alike, d.causes.at_work, d.causes.p_unnamed}, doubted,
+                          d.causes.p_unnamed, d.causes.ranked, d.rules);
+  d.verdict = named.verdict;
+  d.causes.set = std::move(named.set);
+  d.causes.alike = std::move(named.alike);
+  d.causes.at_work = std::move(named.at_work);
+}
+
 // Puts the answer together from what each stage says.
 Diagnosis answer(const TransitionModel& model, const Fitted& fitted, const std::vector<const Candidate*>& candidates,
                  const Elsewhere& elsewhere, const DiagnosisOptions& options, const Progress& progress) {
@@ -405,9 +420,11 @@ Diagnosis answer(const TransitionModel& model, const Fitted& fitted, const std::
   const std::vector<const RankedCause*>& ordered = decided.ranked.ordered;
   const RankedCause* best = decided.ranked.best();
   const Fit& cause = *decided.cause;
-  if (best && !d.shrinkage.measures.empty() && d.shrinkage.measures.front().closed)
+  if (best && !d.shrinkage.measures.empty() && d.shrinkage.measures.front().closed) {
     add_closed_shares(d.causes.at_work, model, fitted.ranking, *best, fitted.given, fitted.recalibrated,
                       decided.held_out.gap, options, [&] { progress(0.86, "what each effect closes"); });
+    if (d.verdict == Verdict::partly_explained) doubt_lesser_effects(d);
+  }
 
   progress(0.88, "steps before failure");
   d.shrinkage.steps = steps_before_failure(model, fitted.given.nuisance, fitted.recalibrated, cause, options.seed);
