@@ -1,6 +1,7 @@
 #include "analysis/blind/at_work_grade.h"
 
 #include <algorithm>
+#include <cmath>
 #include <string>
 #include <tuple>
 
@@ -11,6 +12,7 @@ namespace metastable::analysis {
 namespace {
 
 constexpr double power_of_one = 9, power_of_several = 16;  // left beside the others: less is not asked for
+constexpr double enough_rests = 30;                        // counted, to know the expected steps by
 constexpr double unnamed_said = 0.2;                       // probability of something without a name
 
 using Answer = std::optional<BlindAnswer>;
@@ -82,6 +84,23 @@ void count_kind(AtWorkTally& tally, const BlindTruth& truth, const Answer& answe
 }
 
 }  // namespace
+
+std::vector<Grade> steps_grades(const std::vector<BlindTruth>& truths, const std::vector<Answer>& answers) {
+  Proportion held, narrow;
+  for (std::size_t i = 0; i < truths.size(); ++i) {
+    const BlindTruth& truth = truths[i];
+    if (!answers[i] || !answers[i]->steps || truth.rests_counted < enough_rests) continue;
+    const auto [lower, upper] = *answers[i]->steps;
+    const double steps = truth.collisions_counted / truth.rests_counted;
+    held.count(lower <= steps && steps <= upper);
+    const auto& counted = answers[i]->steps_counted;
+    const bool outside = truth.kind == BlindKind::outside || truth.kind == BlindKind::mixed;
+    if (counted && std::isfinite(counted->second) && !outside)
+      narrow.count(std::log(upper / lower) <= std::log(counted->second / counted->first) / std::sqrt(2.0));
+  }
+  return {{"expected steps of the machine: 90 % intervals hold", held, 0.88, 0.95},
+          {"  as narrow as twice the trials would count them, nothing outside the catalogue", narrow, 0.5, 1}};
+}
 
 std::vector<Grade> at_work_grades(const std::vector<BlindTruth>& truths, const std::vector<Answer>& answers) {
   AtWorkTally tally;

@@ -129,6 +129,18 @@ PowerDesign draw_design(BlindTruth& truth, BlindDice& dice) {
   return design;
 }
 
+// Runs the experiment of a case again until its expected steps are known to some 6 %, or enough was spent on it.
+void count_rests(BlindTruth& truth, dynamics::LaboratorySetup setup) {
+  constexpr double enough_rests = 300, most_collisions = 20000;
+  while (truth.rests_counted < enough_rests && truth.collisions_counted < most_collisions) {
+    ++setup.seed;
+    for (const dynamics::LaboratoryTrial& trial : run_laboratory(setup, 1)) {
+      truth.collisions_counted += static_cast<double>(trial.collisions.size());
+      truth.rests_counted += trial.outcome == dynamics::Outcome::rest;
+    }
+  }
+}
+
 // Sizes the effect that no catalogue holds and adds it to the design and the truth.
 // @param target  power of each of the catalogue's effects
 void size_outside(const BlindPlan& plan, double target, const Power& power, BlindDice& dice, PowerDesign& design,
@@ -300,6 +312,7 @@ BlindCase blind_case(const BlindPlan& plan, int number, std::uint64_t seed, cons
   design.laboratory.effects = truth.effects;
   const dynamics::LaboratorySetup setup = laboratory_setup(design.conditions, design.laboratory);
   made.files = laboratory_files(design.conditions, setup, run_laboratory(setup, 1), folder);
+  count_rests(truth, setup);
   if (plan.kind == BlindKind::left_out) {
     truth.left_out = plan.effects;
     for (const dynamics::EffectInfo& info : dynamics::effect_catalogue())

@@ -57,6 +57,9 @@ struct BlindTruth {
   /// The power left of each of several effects, after a recalibration that has the others in the model. It follows from
   /// the rest and the case and is not sealed; empty until complete_each().
   std::vector<double> left_by_effect = {};
+  /// Collisions at risk and rests of the same experiment, run again and again in the laboratory: their ratio is the
+  /// machine's expected steps. 0 where it was not run.
+  double collisions_counted = 0, rests_counted = 0;
   bool nominal_is_true = true;
   Spread restitution, friction;  ///< true
   double skewness = 0;

@@ -38,6 +38,9 @@ struct BlindAnswer {
   };
   std::vector<SaidAtWork> at_work = {};
   double p_unnamed = 0;
+  /// 90 % intervals of the machine's expected steps: as answered, and as the rests alone count them. The upper end may
+  /// be infinite.
+  std::optional<std::pair<double, double>> steps = {}, steps_counted = {};
   /// Lists by criterion (AICc, BIC) the effects that stepwise selection over the same models names.
   std::map<std::string, std::vector<std::string>> stepwise = {};
 };

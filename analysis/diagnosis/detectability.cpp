@@ -4,7 +4,10 @@
 #include <cmath>
 #include <deque>
 #include <iterator>
+#include <map>
+#include <memory>
 #include <optional>
+#include <string>
 #include <utility>
 
 #include "analysis/statistics/falling_order.h"
@@ -154,6 +157,20 @@ double separation(const AtIssue& issue, const EffectScan& scan, const Swap& swap
   return std::max(0.0, size.dot(scan.information(own, own) * size) - (root.transpose() * cross).squaredNorm());
 }
 
+// Returns what an experiment would tell on average between the cause and its rivals.
+double mean_separation(const TransitionModel& experiment, const std::vector<double>& nuisance, const AtIssue& issue,
+                       const std::vector<Swap>& swaps, const Rules& rules) {
+  std::vector<const Candidate*> scanned;
+  for (const Candidate& candidate : issue.candidates) scanned.push_back(&candidate);
+  // The data were drawn at this fit's start: one step takes up what their noise moves.
+  const Fit shared =
+      fit(experiment, nuisance, issue.shared, {.count = {}, .refit_nuisances = true, .most_iterations = 1});
+  const EffectScan scan = scan_effects(experiment, shared, scanned, 1);
+  double sum = 0;
+  for (const Swap& swap : swaps) sum += std::min(rules.seen_gain, separation(issue, scan, swap));
+  return sum / static_cast<double>(swaps.size());
+}
+
 }  // namespace
 
 std::vector<Detectability> detectability(const EffectScan& scan, const std::vector<const Candidate*>& candidates,
@@ -191,40 +208,39 @@ std::vector<NextExperiment> next_experiments(const TransitionModel& model, const
   std::vector<NextExperiment> all;
   if (swaps.empty()) return all;
   const AtIssue issue = at_issue(cause, swaps);
-  std::vector<const Candidate*> scanned;
-  for (const Candidate& candidate : issue.candidates) scanned.push_back(&candidate);
   std::vector<ChangedExperiment> designs = model.alternatives(cause.nuisance, issue.shared, seed);
+  std::map<std::string, NextExperiment> alone;  // the best of each kind by itself
+  std::shared_ptr<const TransitionModel> changed;
   NextExperiment base;
   while (!designs.empty()) {
     std::vector<NextExperiment> weighed(designs.size());
+    std::vector<std::shared_ptr<const TransitionModel>> made(designs.size());
     markov::parallel_for(designs.size(), threads, [&](std::size_t i) {
       NextExperiment& one = weighed[i];
       one = base;
       one.change += (base.change.empty() ? "" : " and ") + designs[i].words;
       if (!designs[i].kind.empty()) one.changes.emplace_back(designs[i].kind, designs[i].amount);
-      one.separation = 0;
-      // The data were drawn at this fit's start: one step takes up what their noise moves.
-      const Fit shared = fit(*designs[i].model, cause.nuisance, issue.shared,
-                             {.count = {}, .refit_nuisances = true, .most_iterations = 1});
-      const EffectScan scan = scan_effects(*designs[i].model, shared, scanned, 1);
-      for (const Swap& swap : swaps)
-        one.separation += std::min(rules.seen_gain, separation(issue, scan, swap)) / static_cast<double>(swaps.size());
+      made[i] = designs[i].make();
+      one.separation = mean_separation(*made[i], cause.nuisance, issue, swaps, rules);
     });
+    if (alone.empty())
+      for (const NextExperiment& one : weighed)
+        if (!one.changes.empty())
+          if (NextExperiment& best = alone[one.changes[0].first]; one.separation >= best.separation) best = one;
     const auto best = std::ranges::max_element(weighed, {}, &NextExperiment::separation);
-    if (best == weighed.end()) break;
-    const bool pays = !best->changes.empty() && best->separation > worth_a_change * base.separation;
-    std::vector<ChangedExperiment> further;
-    if (pays) {
+    designs.clear();
+    if (!best->changes.empty() && best->separation > worth_a_change * base.separation) {
       base = *best;
-      further = designs[static_cast<std::size_t>(best - weighed.begin())].model->alternatives(cause.nuisance,
-                                                                                              issue.shared, seed);
-      std::erase_if(further, [&](const ChangedExperiment& one) {
-        return one.kind.empty() ||
-               std::ranges::find(base.changes, one.kind, &std::pair<std::string, double>::first) != base.changes.end();
-      });
+      changed = made[static_cast<std::size_t>(best - weighed.begin())];
+      for (ChangedExperiment& one : changed->alternatives(cause.nuisance, issue.shared, seed)) {
+        const bool has =
+            std::ranges::find(base.changes, one.kind, &std::pair<std::string, double>::first) != base.changes.end();
+        if (const auto own = alone.find(one.kind);
+            !has && own != alone.end() && own->second.changes[0].second == one.amount)
+          designs.push_back(std::move(one));
+      }
     }
     std::ranges::move(weighed, std::back_inserter(all));
-    designs = std::move(further);
   }
   std::vector<double> separations;
   for (const NextExperiment& one : all) separations.push_back(one.separation);

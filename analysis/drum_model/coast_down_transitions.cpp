@@ -563,15 +563,18 @@ std::unique_ptr<TransitionModel> CoastDownTransitions::simulate(std::span<const 
 std::vector<ChangedExperiment> CoastDownTransitions::alternatives(std::span<const double> nuisance,
                                                                   std::span<const EffectTerm> terms,
                                                                   std::uint64_t seed) const {
+  const std::vector<double> n(nuisance.begin(), nuisance.end());
+  const std::vector<EffectTerm> t(terms.begin(), terms.end());
   std::vector<ChangedExperiment> all;
-  all.push_back({"", 0, "the same experiment once more", simulate(nuisance, terms, seed)});
-  for (const double by : {0.5, 1.5}) {
-    CoastDownTransitions changed = *this;
-    for (auto& speeds : changed.speeds_)
-      for (double& speed : speeds) speed *= by;
+  all.push_back({"", 0, "the same experiment once more", [this, n, t, seed] { return simulate(n, t, seed); }});
+  for (const double by : {0.5, 1.5})
     all.push_back({"speed_times", by, by < 1 ? "runs at half the speed" : "runs at one and a half times the speed",
-                   changed.simulate(nuisance, terms, seed)});
-  }
+                   [this, n, t, seed, by] {
+                     CoastDownTransitions changed = *this;
+                     for (auto& speeds : changed.speeds_)
+                       for (double& speed : speeds) speed *= by;
+                     return changed.simulate(n, t, seed);
+                   }});
   return all;
 }
 

@@ -148,10 +148,11 @@ class TransitionModel;
 
 /// An experiment that differs from the one at hand in one thing.
 struct ChangedExperiment {
-  std::string kind;                        ///< what differs, in the words of a key ("slope_deg_by"); empty: nothing
-  double amount = 0;                       ///< by how much, in the unit of the kind
-  std::string words;                       ///< "slopes flatter by 2 deg"
-  std::unique_ptr<TransitionModel> model;  ///< with data drawn
+  std::string kind;   ///< what differs, in the words of a key ("slope_deg_by"); empty: nothing
+  double amount = 0;  ///< by how much, in the unit of the kind
+  std::string words;  ///< "slopes flatter by 3 deg"
+  /// Makes it, with data drawn, while the model that lists it lives.
+  std::function<std::unique_ptr<TransitionModel>()> make;
 };
 
 class TransitionModel {
@@ -206,8 +207,8 @@ class TransitionModel {
   /// same data.
   virtual std::unique_ptr<TransitionModel> simulate(std::span<const double> nuisance, std::span<const EffectTerm> terms,
                                                     std::uint64_t seed) const = 0;
-  /// Lists changed experiments, each with data drawn from the model with these effects: the same once more, first, then
-  /// another slope or launch, more columns, longer trials. The default lists none.
+  /// Lists changed experiments, with data that will be drawn from the model with these effects: the same once more,
+  /// first, then another slope or launch, more columns, longer trials. The default lists none.
   virtual std::vector<ChangedExperiment> alternatives(std::span<const double> nuisance,
                                                       std::span<const EffectTerm> terms, std::uint64_t seed) const;
   /// Returns the same design at another place, by the names of what differs there (a slope, a launch), for its expected

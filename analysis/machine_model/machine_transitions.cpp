@@ -81,9 +81,9 @@ class MachineTransitions : public TransitionModel {
   }
   std::vector<ChangedExperiment> alternatives(std::span<const double> nuisance, std::span<const EffectTerm> terms,
                                               std::uint64_t seed) const override {
-    std::vector<ChangedExperiment> all;
-    all.push_back({"", 0, "the same experiment once more", drawn(nuisance, terms, seed)});
-    return all;
+    const std::vector<double> n(nuisance.begin(), nuisance.end());
+    const std::vector<EffectTerm> t(terms.begin(), terms.end());
+    return {{"", 0, "the same experiment once more", [this, n, t, seed] { return drawn(n, t, seed); }}};
   }
   std::pair<double, double> rests() const override {
     double at_risk = 0, failed = 0;

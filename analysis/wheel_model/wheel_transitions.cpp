@@ -279,15 +279,19 @@ std::vector<ChangedExperiment> WheelTransitions::alternatives(std::span<const do
                                                               std::span<const EffectTerm> terms,
                                                               std::uint64_t seed) const {
   std::vector<ChangedExperiment> all;
+  const std::vector<double> n(nuisance.begin(), nuisance.end());
+  const std::vector<EffectTerm> t(terms.begin(), terms.end());
   const auto add = [&](std::string kind, double amount, std::string words,
-                       const std::function<void(WheelTransitions&)>& change) {
-    WheelTransitions changed = *this;
-    change(changed);
-    all.push_back({std::move(kind), amount, std::move(words), changed.simulate(nuisance, terms, seed)});
+                       std::function<void(WheelTransitions&)> change) {
+    all.push_back({std::move(kind), amount, std::move(words), [this, n, t, seed, change = std::move(change)] {
+                     WheelTransitions changed = *this;
+                     change(changed);
+                     return changed.simulate(n, t, seed);
+                   }});
   };
   add("", 0, "the same experiment once more", [](WheelTransitions&) {});
   const double steepest = dynamics::steepest_slope(measured_.wheel.legs()) * 180 / std::numbers::pi;
-  for (const double by : {-4.0, -2.0, 2.0, 4.0})
+  for (const double by : {-3.0, 3.0})
     if (std::all_of(measured_.conditions.begin(), measured_.conditions.end(),
                     [&](const Condition& c) { return c.slope_deg + by > 1 && c.slope_deg + by < steepest; }))
       add("slope_deg_by", by, fmt::format("slopes {} by {:g} deg", by < 0 ? "flatter" : "steeper", std::abs(by)),

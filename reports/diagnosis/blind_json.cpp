@@ -2,8 +2,11 @@
 
 #include <fmt/format.h>
 
+#include <limits>
 #include <nlohmann/json.hpp>
+#include <optional>
 #include <stdexcept>
+#include <utility>
 
 namespace metastable::reports {
 namespace {
@@ -12,6 +15,12 @@ using nlohmann::ordered_json;
 
 ordered_json spread(const analysis::Spread& s) { return {{"mean", s.mean}, {"sd", s.sd}}; }
 analysis::Spread spread(const ordered_json& j) { return {j.at("mean").get<double>(), j.at("sd").get<double>()}; }
+
+// Returns an interval whose upper end is infinite where it is not a number; nothing without a lower end.
+std::optional<std::pair<double, double>> interval(const ordered_json& j) {
+  if (!j.is_array() || j.size() != 2 || !j[0].is_number()) return std::nullopt;
+  return std::pair{j[0].get<double>(), j[1].is_number() ? j[1].get<double>() : std::numeric_limits<double>::infinity()};
+}
 
 }  // namespace
 
@@ -29,6 +38,8 @@ std::string truth_json(const analysis::BlindTruth& truth, const std::string& sal
   j["strength"] = truth.strength;
   j["power"] = truth.power;
   j["power_left_after_recalibration"] = truth.left;
+  j["collisions_counted"] = truth.collisions_counted;
+  j["rests_counted"] = truth.rests_counted;
   j["nominal_is_true"] = truth.nominal_is_true;
   j["restitution"] = spread(truth.restitution);
   j["friction"] = spread(truth.friction);
@@ -54,6 +65,8 @@ analysis::BlindTruth read_truth(const std::string& file, std::string_view text) 
     truth.strength = j.at("strength").get<int>();
     truth.power = j.at("power").get<double>();
     truth.left = j.at("power_left_after_recalibration").get<double>();
+    truth.collisions_counted = j.value("collisions_counted", 0.0);
+    truth.rests_counted = j.value("rests_counted", 0.0);
     truth.nominal_is_true = j.at("nominal_is_true").get<bool>();
     truth.restitution = spread(j.at("restitution"));
     truth.friction = spread(j.at("friction"));
@@ -99,6 +112,12 @@ analysis::BlindAnswer read_answer(const std::string& file, std::string_view text
         answer.at_work.push_back(
             {one.at("effects").get<std::vector<std::string>>(), one.at("probability").get<double>()});
     answer.p_unnamed = j.value("p_unnamed", 0.0);
+    if (j.contains("steps_before_failure")) {
+      const ordered_json& steps = j.at("steps_before_failure");
+      const ordered_json machine = steps.value("machine", ordered_json::array());
+      if (!machine.empty()) answer.steps = interval(machine.front().at("interval_90"));
+      answer.steps_counted = interval(steps.value("observed_interval_90", ordered_json()));
+    }
     if (j.contains("stepwise"))
       answer.stepwise = j.at("stepwise").get<std::map<std::string, std::vector<std::string>>>();
     for (const ordered_json& w : j.at("where"))

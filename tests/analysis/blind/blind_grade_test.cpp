@@ -2,6 +2,7 @@
 
 #include <gtest/gtest.h>
 
+#include <limits>
 #include <stdexcept>
 #include <string>
 
@@ -156,6 +157,24 @@ TEST(BlindGrade, StepwiseSelectionIsSetBesideTheDiagnosis) {
 }
 
 TEST(BlindGrade, AnswersMustBeAsManyAsTruths) { EXPECT_THROW(grade({BlindTruth{}}, {}), std::invalid_argument); }
+
+// Counts of 300 rests in 30,000 collisions are 100 expected steps; intervals are as wide as their ends' ratio.
+TEST(BlindGrade, ExpectedSteps) {
+  BlindTruth known = truth(BlindKind::none, {}, 0), unknown = known;
+  known.collisions_counted = 30000;
+  known.rests_counted = 300;
+  unknown.collisions_counted = 20000;
+  unknown.rests_counted = 3;
+  BlindAnswer holds = said(Verdict::no_gap), misses = holds, open = holds, silent = holds;
+  holds.steps = {80, 130};
+  holds.steps_counted = {60, 150};
+  misses.steps = {101, 130};
+  misses.steps_counted = {90, 120};
+  open.steps = {90, std::numeric_limits<double>::infinity()};
+  const BlindGrades g = grade({known, known, known, known, unknown}, {holds, misses, open, silent, holds});
+  expect(g, "expected steps of the machine: 90 % intervals hold", 2, 3);
+  expect(g, "  as narrow as twice the trials would count them, nothing outside the catalogue", 1, 2);
+}
 
 }  // namespace
 }  // namespace metastable::analysis::test

@@ -96,7 +96,7 @@ class Plane : public test::Line {
                                               std::uint64_t) const override {
     std::vector<ChangedExperiment> all;
     for (const auto& [words, correlation] : {std::pair{"alike", 0.95}, {"apart", 0.0}, {"nearly apart", 0.5}})
-      all.push_back({"correlation", correlation, words, std::make_unique<Plane>(correlation, 31)});
+      all.push_back({"correlation", correlation, words, [c = correlation] { return std::make_unique<Plane>(c, 31); }});
     return all;
   }
   const std::vector<double>& v() const { return v_; }
