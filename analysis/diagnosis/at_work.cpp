@@ -83,7 +83,7 @@ std::vector<AtWork> list_at_work(const Probabilities& probabilities, const Odds&
   // Effects of the first hypothesis, each with what stands in its place in those that are alike to it.
   std::vector<std::string> listed;
   for (const std::string& effect : ranked.front().effects) {
-    AtWork one{effect, {effect}, probability({effect}), averaged(ranked, effect), {}, {}};
+    AtWork one{effect, {effect}, probability({effect}), averaged(ranked, effect), {}, {}, {}};
     if (one.probability < rules.least_at_work) {
       for (const Cause& cause : ranked) {
         if (std::ranges::find(alike, cause.name()) == alike.end() || holds(cause, effect)) continue;
@@ -104,7 +104,7 @@ std::vector<AtWork> list_at_work(const Probabilities& probabilities, const Odds&
       if (std::ranges::find(listed, effect) != listed.end()) continue;
       listed.push_back(effect);
       if (const double p = probability({effect}); p >= rules.least_listed)
-        all.push_back({effect, {effect}, p, averaged(ranked, effect), {}, {}});
+        all.push_back({effect, {effect}, p, averaged(ranked, effect), {}, {}, {}});
     }
   std::ranges::stable_sort(all, std::ranges::greater{}, &AtWork::probability);
   return all;
@@ -149,7 +149,8 @@ void add_closed_shares(std::vector<AtWork>& at_work, const TransitionModel& mode
   };
   struct Asked {
     AtWork* whose;
-    std::optional<Estimate> AtWork::*which;
+    std::size_t alone;
+    std::optional<std::size_t> beside;
   };
   std::vector<GapPart> parts;
   std::vector<Asked> asked;
@@ -163,19 +164,24 @@ void add_closed_shares(std::vector<AtWork>& at_work, const TransitionModel& mode
     alone.back().nuisance = given.nuisance;
     alone.back().terms = {*own};
     alone.back().converged = false;  // it is a start, not a fit
+    asked.push_back({&one, parts.size(), {}});
     parts.push_back({&alone.back(), &given, false});
-    asked.push_back({&one, &AtWork::closes_alone});
     std::vector<EffectTerm> others = best.fit.terms;
     std::erase_if(others, [&](const EffectTerm& term) { return term.candidate == own->candidate; });
     if (const Fit* without = fit_of(others)) {
+      asked.back().beside = parts.size();
       parts.push_back({&best.fit, without, true});
-      asked.push_back({&one, &AtWork::closes_beside});
     }
   }
   if (parts.empty()) return;
-  const std::vector<Estimate> closed =
+  const std::vector<ClosedShare> closed =
       parts_closed(model, recalibrated, gap, parts, options.folds, options.threads, options.seed, heartbeat);
-  for (std::size_t k = 0; k < parts.size(); ++k) asked[k].whose->*asked[k].which = closed[k];
+  for (const Asked& one : asked) {
+    one.whose->closes_alone = closed[one.alone].estimate();
+    if (!one.beside) continue;
+    one.whose->closes_beside = closed[*one.beside].estimate();
+    one.whose->closes_mean = mean_of(closed[one.alone], closed[*one.beside]).estimate();
+  }
 }
 
 }  // namespace metastable::analysis

@@ -33,9 +33,22 @@ Fit fit_from(const Fit& start, const TransitionModel& model, const Fit& recalibr
   return fit(model, start.nuisance, start.terms, options);
 }
 
-std::vector<Estimate> parts_closed(const TransitionModel& model, const Fit& recalibrated,
-                                   const std::vector<double>& gap, const std::vector<GapPart>& parts, int folds,
-                                   int threads, std::uint64_t seed, const std::function<void()>& heartbeat) {
+Estimate ClosedShare::estimate() const {
+  std::vector<double> sorted = drawn;
+  std::ranges::sort(sorted);
+  return {value, sorted[sorted.size() * 5 / 100], sorted[sorted.size() * 95 / 100]};
+}
+
+ClosedShare mean_of(const ClosedShare& one, const ClosedShare& other) {
+  ClosedShare mean{0.5 * (one.value + other.value), {}};
+  for (std::size_t draw = 0; draw < one.drawn.size(); ++draw)
+    mean.drawn.push_back(0.5 * (one.drawn[draw] + other.drawn[draw]));
+  return mean;
+}
+
+std::vector<ClosedShare> parts_closed(const TransitionModel& model, const Fit& recalibrated,
+                                      const std::vector<double>& gap, const std::vector<GapPart>& parts, int folds,
+                                      int threads, std::uint64_t seed, const std::function<void()>& heartbeat) {
   using Refitted = std::pair<const Fit*, bool>;
   std::vector<Refitted> fits;  // each once, with whether its nuisances are refitted
   for (const GapPart& part : parts)
@@ -63,7 +76,7 @@ std::vector<Estimate> parts_closed(const TransitionModel& model, const Fit& reca
   const auto of = [&](const Fit* one, bool refitted) {
     return static_cast<std::size_t>(std::ranges::find(fits, Refitted{one, refitted}) - fits.begin());
   };
-  std::vector<Estimate> closed;
+  std::vector<ClosedShare> closed;
   for (const GapPart& part : parts) {
     const std::vector<double>& with = score[of(part.with, part.recalibrated)];
     const std::vector<double>& without = score[of(part.without, part.recalibrated)];
@@ -75,12 +88,9 @@ std::vector<Estimate> parts_closed(const TransitionModel& model, const Fit& reca
       }
       return closes / all;
     };
-    std::vector<double> drawn;
+    ClosedShare& one = closed.emplace_back(ClosedShare{share([](std::size_t) { return 1.0; }), {}});
     for (std::uint64_t draw = 0; draw < closing_draws; ++draw)
-      drawn.push_back(share([&](std::size_t t) { return exponential_weight(seed, draw, t); }));
-    std::ranges::sort(drawn);
-    closed.push_back(
-        {share([](std::size_t) { return 1.0; }), drawn[closing_draws * 5 / 100], drawn[closing_draws * 95 / 100]});
+      one.drawn.push_back(share([&](std::size_t t) { return exponential_weight(seed, draw, t); }));
   }
   return closed;
 }

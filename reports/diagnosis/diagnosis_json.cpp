@@ -115,16 +115,19 @@ Json interval_json(const std::optional<Estimate>& share) {
 
 Json at_work_json(const analysis::AtWork& one) {
   const NamedParameters parameters = named_parameters(one.effects.front(), one.parameters);
-  return {
-      {"name", one.name},
-      {"effects", one.effects},
-      {"probability", number(one.probability)},
-      {"parameters", parameters.values},
-      {"interval_90", parameters.intervals},
-      {"closes",
-       {{"alone", share_json(one.closes_alone)},
-        {"beside", share_json(one.closes_beside)},
-        {"interval_90", {{"alone", interval_json(one.closes_alone)}, {"beside", interval_json(one.closes_beside)}}}}}};
+  return {{"name", one.name},
+          {"effects", one.effects},
+          {"probability", number(one.probability)},
+          {"parameters", parameters.values},
+          {"interval_90", parameters.intervals},
+          {"closes",
+           {{"alone", share_json(one.closes_alone)},
+            {"beside", share_json(one.closes_beside)},
+            {"mean", share_json(one.closes_mean)},
+            {"interval_90",
+             {{"alone", interval_json(one.closes_alone)},
+              {"beside", interval_json(one.closes_beside)},
+              {"mean", interval_json(one.closes_mean)}}}}}};
 }
 
 // Lists where something without a name acts; what it would close is what stays, said of the likeliest place.

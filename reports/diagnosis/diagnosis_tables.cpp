@@ -174,12 +174,13 @@ Table at_work_table(const Diagnosis& d) {
       .title = "What is at work",
       .notes = {"Probability: over all hypotheses that hold it, whatever else is at work. Alone: the share of the "
                 "held-out gap that it closes in the model as given; last: added to the recalibrated model with "
-                "the others."},
+                "the others; mean: of the two."},
       .columns = {{"effect"},
                   {"probability", "", NumberFormat::fixed, 3},
                   {"parameters (90 % intervals)"},
                   {"closes alone", "%", NumberFormat::significant, 2},
-                  {"closes last", "%", NumberFormat::significant, 2}}};
+                  {"closes last", "%", NumberFormat::significant, 2},
+                  {"mean", "%", NumberFormat::significant, 2}}};
   const auto percent = [](const std::optional<Estimate>& share) {
     return share ? Cell(Estimate{100 * share->value, 100 * share->lower, 100 * share->upper}) : Cell("");
   };
@@ -187,9 +188,9 @@ Table at_work_table(const Diagnosis& d) {
     std::string name = one.name;
     if (one.effects.size() > 1) name += fmt::format(" ({})", fmt::join(one.effects, ", "));
     table.rows.push_back({name, one.probability, parameters_text(one.parameters), percent(one.closes_alone),
-                          percent(one.closes_beside)});
+                          percent(one.closes_beside), percent(one.closes_mean)});
   }
-  if (!table.rows.empty()) table.rows.push_back({"something without a name", d.causes.p_unnamed, "", "", ""});
+  if (!table.rows.empty()) table.rows.push_back({"something without a name", d.causes.p_unnamed, "", "", "", ""});
   return table;
 }
 

@@ -61,15 +61,22 @@ TEST(HeldOut, PartsAreThoseOfTheMeasure) {
   alone.converged = false;
   const HeldOutGap held = gap_shrinkage(*data, given, recalibrated, {&with}, 4, 1, 1);
   const Shrinkage& s = held.measures.front();
-  const std::vector<Estimate> parts =
+  const std::vector<ClosedShare> parts =
       parts_closed(*data, recalibrated, held.gap, {{&with, &recalibrated, true}, {&alone, &given, false}}, 4, 1, 1);
   EXPECT_NEAR(parts[0].value, (s.recalibrated - s.with_effect) / s.baseline, 1e-9);
-  EXPECT_GT(parts[1].lower, 0.5);
+  EXPECT_GT(parts[1].estimate().lower, 0.5);
   EXPECT_LT(parts[1].value, 1.02);
-  for (const Estimate& part : parts) {
-    EXPECT_LE(part.lower, part.value);
-    EXPECT_GE(part.upper, part.value);
+  for (const ClosedShare& part : parts) {
+    EXPECT_LE(part.estimate().lower, part.value);
+    EXPECT_GE(part.estimate().upper, part.value);
   }
+  // A share has errors that a mean with itself keeps, and with its opposite cancels.
+  ClosedShare opposite = parts[0];
+  opposite.value = 2 - opposite.value;
+  for (double& one : opposite.drawn) one = 2 - one;
+  EXPECT_EQ(mean_of(parts[0], parts[0]).estimate().lower, parts[0].estimate().lower);
+  EXPECT_NEAR(mean_of(parts[0], opposite).estimate().lower, 1, 1e-12);
+  EXPECT_NEAR(mean_of(parts[0], opposite).estimate().upper, 1, 1e-12);
 }
 
 TEST(GapShrinkage, WithoutRivalsTheLastModelIsTheRecalibratedOne) {
