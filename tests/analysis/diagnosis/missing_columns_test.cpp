@@ -2,7 +2,6 @@
 
 #include <gtest/gtest.h>
 
-#include <cmath>
 #include <memory>
 #include <utility>
 #include <vector>
@@ -16,17 +15,17 @@ namespace {
 using test::line;
 using test::Line;
 
-// A line that shows a third of its noise in another column: with that it has a nuisance of its own, in front of the
+// A line with another column, which takes two thirds of its noise away and has a nuisance of its own, in front of the
 // others.
 class Completed : public Line {
  public:
   explicit Completed(const Line& from) : Line(from) {
+    for (double& y : y_) y /= 3;
     nuisances_.insert(nuisances_.begin(), {"offset of the column", 0, 1, 1e-4, -10, 10});
   }
   Evaluation evaluate(std::span<const double> n, std::span<const EffectTerm> terms) const override {
     EXPECT_EQ(n.size(), 3U);
-    const std::vector<double> line{n[1] + n[0], n[2] - std::log(3)};
-    return Line::evaluate(line, terms);
+    return Line::evaluate(std::vector<double>{n[1] + n[0], n[2]}, terms);
   }
   std::unique_ptr<TransitionModel> simulate(std::span<const double>, std::span<const EffectTerm>,
                                             std::uint64_t) const override {
