@@ -129,9 +129,10 @@ PowerDesign draw_design(BlindTruth& truth, BlindDice& dice) {
   return design;
 }
 
-// Runs the experiment of a case again until its expected steps are known to some 6 %, or enough was spent on it.
+// Runs the experiment of a case again until its expected steps are known to some 7 %, or ten seconds were spent on it.
 void count_rests(BlindTruth& truth, dynamics::LaboratorySetup setup) {
-  constexpr double enough_rests = 300, most_collisions = 20000;
+  constexpr double enough_rests = 200;
+  const double most_collisions = setup.law == dynamics::Law::settled ? 6000 : 20000;
   while (truth.rests_counted < enough_rests && truth.collisions_counted < most_collisions) {
     ++setup.seed;
     for (const dynamics::LaboratoryTrial& trial : run_laboratory(setup, 1)) {
