@@ -9,11 +9,24 @@
 namespace metastable::analysis {
 namespace {
 
-constexpr double variant_gain = 8;       // promised by one more variant of an effect that is fitted,
-constexpr double variant_share = 0.8;    //   and this share of the best variant's gain
+constexpr double variant_gain = 8;     // promised by one more variant of an effect that is fitted,
+constexpr double variant_share = 0.8;  //   and this share of the best variant's gain
+constexpr double far_gain = 100;       // promised by the best variant, beyond which the scores do not tell kinds apart
 constexpr double furthest_start = 0.25;  // share of a parameter's range
 constexpr double small_start = 0.1;      // share of a size worth starting from, where the scores' start was a bad one
 constexpr double worth_moving = 0.2;     // rise of the log likelihood
+
+// Says whether two variants are two kinds of one thing, as a leg's friction and its restitution: they differ in one
+// entry only, of which the list has no third value.
+bool of_two_kinds(const Candidate& candidate, std::size_t one, std::size_t other) {
+  const std::vector<double>&a = candidate.variants[one], &b = candidate.variants[other];
+  std::size_t differing = 0, at = 0;
+  for (std::size_t entry = 0; entry < a.size(); ++entry)
+    if (a[entry] != b[entry]) ++differing, at = entry;
+  return differing == 1 && std::ranges::all_of(candidate.variants, [&](const std::vector<double>& v) {
+           return v[at] == a[at] || v[at] == b[at];
+         });
+}
 
 // These variants are worth a full fit.
 std::vector<std::size_t> leading_variants(const ScannedEffect& scanned, std::size_t most) {
@@ -23,6 +36,10 @@ std::vector<std::size_t> leading_variants(const ScannedEffect& scanned, std::siz
     if (leading.empty() || (leading.size() < most && scanned.gain[v] > variant_gain &&
                             scanned.gain[v] > variant_share * scanned.gain[order[0]]))
       leading.push_back(v);
+  if (scanned.gain[order[0]] > far_gain)
+    for (const std::size_t v : order)
+      if (of_two_kinds(*scanned.candidate, order[0], v) && std::ranges::find(leading, v) == leading.end())
+        leading.push_back(v);
   return leading;
 }
 

@@ -52,6 +52,7 @@ struct WheelRuns {
   bool speeds_after = false;       ///< omega+ is there
   bool slides_seen = false;        ///< the feet's places are there; `settled` only
   bool stands_by_plus = false;     ///< whether a foot stands is judged by its omega+; `settled` only
+  std::vector<bool> springing;     ///< by leg: its feet are judged so where the others' are not; empty: no leg's
   bool exact_stances = false;      ///< they repeat the model to rounding, and say nothing
   bool times_judge = true;         ///< false: times are so much more exact than speeds that they tell the speeds' noise
   std::vector<std::string> notes;  ///< what was assumed, a sentence each
@@ -80,7 +81,7 @@ void tabulate_landings(WheelRuns& measured);
 /// touches, as the one before was. Where restitution varies so much that few are, omega+ tells: a foot stands if it
 /// does with the largest restitution that can have left it so fast, that of a foot that sticks. A first impact then
 /// counts if the foot before stood, and what follows it if its own does, too. Both go by what was seen before, so that
-/// they choose no outcomes. Under other laws all count.
+/// they choose no outcomes. So it is with legs that spring more than the others. Under other laws all count.
 void mark_counted(const WheelRuns& measured, WheelRun& run);
 
 /// Reads an experiment. A missing leg is found from the stances where omega_plus is there, else legs of mean length are

@@ -10,7 +10,6 @@ namespace {
 
 constexpr int speeds = 15, grid_restitutions = 13;
 constexpr double sds = 4, least_width = 0.3;  // of the restitutions around their mean; [1]
-constexpr double nearly_all = 2;              // of these sds above the mean, at which a foot must still come to stand
 constexpr double just_above = 1e-7;           // mu_r, of the first place
 // The places at which a wheel of so much more J is followed, for the changes with J: every so many speeds and
 // restitutions.
@@ -158,7 +157,7 @@ LandingShares empty_grid(const SettledMap& map, double slowest, double fastest, 
   for (int leg = 0; leg < map.motion().wheel().legs(); ++leg) {
     LandingShares::Leg one = plain_leg(map, leg);
     one.settles_below =
-        settles_below(map, leg, std::min(mean + nearly_all * sd, most_settled_restitution), slowest, fastest);
+        settles_below(map, leg, std::min(mean + settling_sds * sd, most_settled_restitution), slowest, fastest);
     settles = std::max(settles, one.settles_below);
     one.drag =
         drag_of(map.motion(), leg, (slowest + one.settles_below) / 2, std::clamp(mean, 0.0, most_settled_restitution));
@@ -195,7 +194,7 @@ void copy_first_leg(LandingShares& grid) {
 std::shared_ptr<const LandingShares> landing_grid(
     const SettledWheel& wheel, double slowest, double fastest, const ContactSpread& contact,
     const std::function<void(std::size_t count, const std::function<void(std::size_t)>& work)>& executor,
-    bool every_speed) {
+    bool every_speed, bool settling) {
   SettledMapOptions options;
   options.direct = true;
   SettledWheel more = wheel;
@@ -203,7 +202,7 @@ std::shared_ptr<const LandingShares> landing_grid(
   const std::shared_ptr<const SettledMap> map = SettledMap::of(wheel, options),
                                           map_of_more = SettledMap::of(more, options);
   auto grid = std::make_shared<LandingShares>(empty_grid(*map, slowest, fastest, contact, every_speed));
-  if (every_speed) fill_settling(*grid, *map);
+  if (settling) fill_settling(*grid, *map);
   LandingShares heavier = empty_coarse_grid(*grid, *map_of_more);
 
   const auto rows = static_cast<std::size_t>(grid_restitutions),
