@@ -123,8 +123,9 @@ def grade(run, out, steps):
     counted = {line[0]: (int(line[1]), int(line[2])) for line in csv.reader(open(steps))} if steps else {}
     rows = [row_of(case, json.loads((pathlib.Path(f"{run}-sealed") / f"{case}.json").read_text()),
                    json.loads(answers[case].read_text()), counted) for case in answers]
+    filled = [name for name in rows[0] if any(row[name] != "" for row in rows) and name != "times"]
     with open(out, "w", newline="") as file:
-        writer = csv.DictWriter(file, rows[0])
+        writer = csv.DictWriter(file, filled, extrasaction="ignore", lineterminator="\n")
         writer.writeheader()
         writer.writerows(rows)
     summary(rows)
