@@ -269,9 +269,10 @@ WalkerFalls how_it_falls(const markov::BatchMap& map, std::span<const double> st
   if (noises.size() != static_cast<std::size_t>(map.scores))
     throw std::invalid_argument("how it falls: one noise for each score expected");
   const double spacing = study.sizes.at(1).spacing;
+  if (study.period > 1) start = study.orbit.frames.front().centre;
   WalkerFalls falls =
       Falls(
-          map, start, noises,
+          markov::over_revolutions(map, study.period), start, noises,
           {.spacing = spacing, .seed = options.seed, .most_bytes = options.most_bytes, .row_states = study.row_states},
           study, options.threads)
           .tell();

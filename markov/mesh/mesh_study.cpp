@@ -48,6 +48,7 @@ constexpr double pilot_steps = 4;
 // States of a row where the chance of failing jumps, by dimension: of 32 in one dimension shifts differ by 4 per cent.
 constexpr std::array<int, 4> row_states_by_dimension{256, 32, 16, 16};
 constexpr double memory_side_by_side = 0.5;  // of all: for the meshes of a dear map that grow side by side
+constexpr double same_gait = 1e-5;           // of a number of a state: two orbits that were iterated are one
 constexpr double longest_trial_factor = 30;  // times the expected steps: one trial of 1e13 takes longer
 
 /// Returns the coarsest spacings that the extrapolation was found to bear, by dimension.
@@ -154,7 +155,9 @@ std::pair<std::string, bool> walked_alone(const BatchMap& map, std::span<const d
 /// Makes one study.
 class Run {
  public:
-  Run(const BatchMap& map, std::span<const double> start, const MeshStudyOptions& options, NoiseFreeOrbit orbit)
+  /// @param period  revolutions of the map that one of `map` stands for
+  Run(const BatchMap& map, std::span<const double> start, const MeshStudyOptions& options, NoiseFreeOrbit orbit,
+      int period)
       : map_(map),
         start_(start),
         options_(options),
@@ -169,6 +172,7 @@ class Run {
         brackets_(steps_) {
     study_.sizes.resize(sizes_);
     study_.orbit = std::move(orbit);
+    study_.period = period;
     map_.step = [this, step = map.step](int phase, auto states, auto scores, auto next, auto failed) {
       step(phase, states, scores, next, failed);
       const std::lock_guard lock(mutex_);
@@ -229,6 +233,21 @@ class Run {
 
   bool several_gaits() const { return study_.gaits.states.size() > 1; }
 
+  /// Says whether walks from the start know all gaits: there is one, or the others are its own, met some revolutions
+  /// later.
+  bool walks_know_all() const {
+    const std::size_t revolution = frames_.size() / static_cast<std::size_t>(study_.period);
+    return std::ranges::all_of(study_.gaits.states, [&](const std::vector<double>& state) {
+      for (std::size_t phase = 0; phase < frames_.size(); phase += revolution) {
+        bool same = true;
+        for (std::size_t k = 0; k < state.size(); ++k)
+          same = same && std::abs(state[k] - frames_[phase].centre[k]) <= same_gait * (1 + std::abs(state[k]));
+        if (same) return true;
+      }
+      return false;
+    });
+  }
+
   /// Looks for other gaits around the coarsest mesh, and solves that, grown anew where there are some. Returns its
   /// bytes.
   std::size_t begin() {
@@ -281,7 +300,7 @@ class Run {
   /// Foresees the rows of both other ways. @param steps, mixing  as far as they are known
   void foresee_other_ways(double steps, double mixing) {
     const auto allowed = static_cast<double>(options_.simulated_steps), expected = std::max(1.0, steps);
-    const bool to_failure = allowed / expected >= static_cast<double>(fewest_trials) && !several_gaits();
+    const bool to_failure = allowed / expected >= static_cast<double>(fewest_trials) && walks_know_all();
     const double longest = least_counted_share * allowed / static_cast<double>(walk_count);
     const double simulated = to_failure ? std::min(allowed, static_cast<double>(most_trials) * expected)
                                         : static_cast<double>(walk_count) * expected * -std::expm1(-longest / expected);
@@ -453,11 +472,11 @@ class Run {
       study_.no_simulated = "not asked for";
       return;
     }
-    if (trials < fewest_trials || several_gaits()) {
+    if (trials < fewest_trials || !walks_know_all()) {
       const std::size_t walks = std::clamp<std::size_t>(options_.simulated_steps, 2, walk_count);
       count(walks, std::floor(least_counted_share * allowed / static_cast<double>(walks)));
       study_.no_simulated =
-          (several_gaits() ? "it would know one gait; " : "too few trials would fail; ") + count_text(*study_.walks);
+          (!walks_know_all() ? "it would know one gait; " : "too few trials would fail; ") + count_text(*study_.walks);
       return;
     }
     std::vector<std::uint64_t> steps;
@@ -481,7 +500,9 @@ class Run {
     if (options_.guided_samples == 0) study_.no_guided = "not asked for";
     if (options_.guided_samples > 0 && study_.steps.value <= sampled_from)
       study_.no_guided = "not asked: failures are too frequent";
-    if (several_gaits()) study_.no_guided = "its samples would know one gait";
+    if (several_gaits())
+      study_.no_guided =
+          walks_know_all() ? "its samples would know one order of the gait" : "its samples would know one gait";
     if (!study_.no_guided.empty()) return;
     if (!guide_) guide_ = std::make_unique<Mesh>(map_, frames_, start_, mesh_options(1, 0));
     // It goes from the start to where failures keep their share: the time to forget the start, some times over. A
@@ -539,6 +560,19 @@ class Run {
   WorkLeft work_;
 };
 
+MeshStudy study_around(const BatchMap& map, std::span<const double> start, const MeshStudyOptions& options,
+                       NoiseFreeOrbit orbit, int period) {
+  try {
+    return Run(map, start, options, std::move(orbit), period).run();
+  } catch (const NoFailureFound& error) {
+    if (options.simulated_steps == 0) throw;
+    const auto [found, fails] = walked_alone(map, start, options);
+    const std::string text = fmt::format("{}; {}", error.what(), found);
+    if (fails) throw Disagreement(text + ": no number is given");
+    throw NoFailureFound(text);
+  }
+}
+
 }  // namespace
 
 MeshEstimate steps_from_quasi_stationary(const MeshStudy& study) {
@@ -556,10 +590,13 @@ MeshStudy mesh_study(const BatchMap& map, std::span<const double> start, const M
     throw std::invalid_argument(fmt::format("mesh study: {} sizes, 3 or 4 expected", options.sizes));
   if (options.shifts < 6)
     throw std::invalid_argument(fmt::format("mesh study: {} shifts, 6 or more expected", options.shifts));
-  NoiseFreeOrbit orbit;
   try {
-    orbit = noise_free_orbit(map, start);
+    return study_around(map, start, options, noise_free_orbit(map, start), 1);
   } catch (const NoOrbit& error) {
+    if (const auto gait = periodic_gait(map, start); gait && gait->period > 1) {
+      const BatchMap longer = over_revolutions(map, gait->period);
+      return study_around(longer, gait->state, options, noise_free_orbit(longer, gait->state), gait->period);
+    }
     if (options.simulated_steps == 0) throw;
     std::string walked;
     try {
@@ -568,15 +605,6 @@ MeshStudy mesh_study(const BatchMap& map, std::span<const double> start, const M
       walked = fmt::format("simulated walks end: {}", broken.what());
     }
     throw NoOrbit(fmt::format("{}; {}", error.what(), walked));
-  }
-  try {
-    return Run(map, start, options, std::move(orbit)).run();
-  } catch (const NoFailureFound& error) {
-    if (options.simulated_steps == 0) throw;
-    const auto [found, fails] = walked_alone(map, start, options);
-    const std::string text = fmt::format("{}; {}", error.what(), found);
-    if (fails) throw Disagreement(text + ": no number is given");
-    throw NoFailureFound(text);
   }
 }
 

@@ -25,8 +25,8 @@ struct MeshStudyOptions {
   int shifts = 6;      ///< of each size, >= 6
   double margin = 0;   ///< MeshOptions::margin; 0: 12, of several scores 16
   std::uint64_t seed = 1;
-  int threads = 0;                                ///< 0: all cores; the bits do not depend on it
-  std::size_t guided_samples = 4000;              ///< 0: none
+  int threads = 0;                    ///< 0: all cores; the bits do not depend on it
+  std::size_t guided_samples = 4000;  ///< 0: none
   /// Direct simulation takes about so many steps, in 10^7 trials to failure at most; 0: none at all.
   std::uint64_t simulated_steps = 2000000;
   std::size_t most_bytes = std::size_t{3} << 30;  ///< of all meshes held at once
@@ -52,7 +52,8 @@ struct MeshStudy {
   double mixing_steps = 0;
   std::vector<double> survival;  ///< as MeshPassage's, of the finest mesh's first shift
   double cheapest_failure = 0;
-  NoiseFreeOrbit orbit;
+  NoiseFreeOrbit orbit;  ///< of a gait that comes back after several revolutions, over all of them
+  int period = 1;        ///< revolutions after which the gait comes back
   OtherGaits gaits;
   std::vector<double> gait_share;  ///< of the expected steps, by gait, the start's own first; empty: there is no other
   /// Holds the relative parts of the interval of `steps`: the shifts' t-interval, what is left of the discretization,
@@ -85,6 +86,9 @@ class Disagreement : public std::runtime_error {
   using std::runtime_error::runtime_error;
 };
 
+/// Where the start's noise-free orbit is unstable and leads to a gait that comes back after several revolutions
+/// (periodic_gait), that gait is studied, from a state of it.
+///
 /// Solves `sizes` meshes of `shifts` shifts each, extrapolates ln T to spacing 0 (h^2 and h^4, with four sizes h^6) for
 /// each shift by itself. The interval joins, as a root of squares, the t-interval over the shifts and the
 /// discretization error; the bracket of what leaves the mesh is added, and on its side what blind spots may hold. The

@@ -5,6 +5,7 @@
 #include <Eigen/Core>
 #include <algorithm>
 #include <cmath>
+#include <deque>
 #include <optional>
 
 #include "markov/dense_matrix.h"
@@ -18,6 +19,10 @@ using Eigen::VectorXd;
 
 constexpr int revolution_limit = 5000;
 constexpr double orbit_tolerance = 1e-11;
+constexpr double period_tolerance = 1e-11;  // of a state that has come back
+constexpr int least_revolutions =
+    300;                            // before a gait counts as reached: a way away from an unstable one begins slowly
+constexpr double nudge = 1e-6;      // beside a start, relative
 constexpr double jump_ratio = 3;    // derivative over the change from -1 to 1 sd, beyond which the map jumps
 constexpr double narrowest = 0.05;  // of the widest axis: nodes there are no nearer
 
@@ -146,6 +151,44 @@ std::vector<double> row_major(const MatrixXd& m) {
 }
 
 }  // namespace
+
+std::optional<PeriodicGait> periodic_gait(const BatchMap& map, std::span<const double> start) {
+  const Probe probe(map);
+  const VectorXd quiet = VectorXd::Zero(map.scores);
+  VectorXd state = Eigen::Map<const VectorXd>(start.data(), map.dimension);
+  state += nudge * (state.cwiseAbs() + VectorXd::Constant(map.dimension, nudge));
+  std::deque<VectorXd> before;  // the last states at phase 0, the latest first
+  try {
+    for (int revolution = 0; revolution < revolution_limit; ++revolution) {
+      before.push_front(state);
+      if (before.size() > static_cast<std::size_t>(longest_period)) before.pop_back();
+      for (int phase = 0; phase < map.phases; ++phase) state = probe(phase, state, quiet, "without noise it fails");
+      const double near = period_tolerance * (1 + state.cwiseAbs().maxCoeff());
+      for (std::size_t period = 1; period <= before.size(); ++period)
+        if ((state - before[period - 1]).cwiseAbs().maxCoeff() <= near && revolution > least_revolutions)
+          return PeriodicGait{static_cast<int>(period), {state.begin(), state.end()}};
+    }
+  } catch (const MapError&) {  // it ends there: there is no gait to find
+  }
+  return std::nullopt;
+}
+
+BatchMap over_revolutions(const BatchMap& map, int revolutions) {
+  BatchMap longer = map;
+  longer.phases = map.phases * revolutions;
+  const int phases = map.phases;
+  if (map.step)
+    longer.step = [step = map.step, phases](int phase, auto states, auto scores, auto next, auto failed) {
+      step(phase % phases, states, scores, next, failed);
+    };
+  if (map.draw)
+    longer.draw = [draw = map.draw, phases](int phase, auto states, auto words, auto next, auto failed) {
+      draw(phase % phases, states, words, next, failed);
+    };
+  if (map.inside)
+    longer.inside = [inside = map.inside, phases](int phase, auto state) { return inside(phase % phases, state); };
+  return longer;
+}
 
 std::vector<NoiseFrame> noise_frames(const BatchMap& map, std::span<const double> start) {
   return noise_free_orbit(map, start).frames;

@@ -3,6 +3,7 @@
 
 #include <array>
 #include <complex>
+#include <optional>
 #include <span>
 #include <vector>
 
@@ -47,5 +48,20 @@ struct NoiseFreeOrbit {
 };
 /// Does the same as noise_frames(), and keeps the eigenvalues. @throws as it
 NoiseFreeOrbit noise_free_orbit(const BatchMap& map, std::span<const double> start);
+
+inline constexpr int longest_period = 16;
+
+/// An attractor without noise that comes back after several revolutions.
+struct PeriodicGait {
+  int period = 1;             ///< revolutions, up to longest_period
+  std::vector<double> state;  ///< on it, at phase 0
+};
+
+/// Finds where the map leads without noise from right beside `start`, 1e-6 of it away: an orbit that is a start itself
+/// may be unstable. Returns nothing where that fails within 5000 revolutions, or has no period up to longest_period.
+std::optional<PeriodicGait> periodic_gait(const BatchMap& map, std::span<const double> start);
+
+/// Returns the map watched over so many of its revolutions: of the phases of one come those of the next.
+BatchMap over_revolutions(const BatchMap& map, int revolutions);
 
 }  // namespace metastable::markov

@@ -74,23 +74,28 @@ WalkerJson mesh_study_json(const std::string& name, const markov::MeshStudy& s) 
           {"memory_bytes", s.expected_bytes}};
 }
 
-WalkerJson walker_study_json(const WalkerSetting& setting, const WalkerStudy& study) {
-  WalkerJson json = mesh_study_json(setting.describe(), study.passage);
-  json["gait"] = {{"names", setting.map().names()},
-                  {"state", study.gait.state},
-                  {"eigenvalues", eigenvalues_json(study.gait.eigenvalues)}};
-  return json;
-}
-
-// Tells of the orbit of a map of one's own; where it has several phases, of each.
-WalkerJson orbit_json(const MapStudy& study) {
-  const std::vector<markov::NoiseFrame>& frames = study.passage.orbit.frames;
-  WalkerJson json = {{"names", study.names},
+// Tells of the orbit around which a mesh lies; where it has several phases, of each.
+WalkerJson orbit_json(const std::vector<std::string>& names, const markov::MeshStudy& study) {
+  const std::vector<markov::NoiseFrame>& frames = study.orbit.frames;
+  WalkerJson json = {{"names", names},
                      {"state", frames.front().centre},
-                     {"eigenvalues", eigenvalues_json(study.passage.orbit.eigenvalues)}};
+                     {"eigenvalues", eigenvalues_json(study.orbit.eigenvalues)},
+                     {"period", study.period}};
   if (frames.size() == 1) return json;
   json["state_by_phase"] = WalkerJson::array();
   for (const markov::NoiseFrame& frame : frames) json["state_by_phase"].push_back(frame.centre);
+  return json;
+}
+
+WalkerJson walker_study_json(const WalkerSetting& setting, const WalkerStudy& study) {
+  WalkerJson json = mesh_study_json(setting.describe(), study.passage);
+  if (study.passage.period > 1)
+    json["gait"] = orbit_json(setting.map().names(), study.passage);
+  else
+    json["gait"] = {{"names", setting.map().names()},
+                    {"state", study.gait.state},
+                    {"eigenvalues", eigenvalues_json(study.gait.eigenvalues)},
+                    {"period", 1}};
   return json;
 }
 
@@ -126,8 +131,9 @@ Lines head_lines(const markov::MeshStudy& s) {
 Lines mesh_lines(const markov::MeshStudy& s) {
   Lines lines;
   for (std::size_t g = 1; g < s.gait_share.size(); ++g)
-    lines.emplace_back("another gait", fmt::format("at {:.6g}: {:.3g} of the steps", fmt::join(s.gaits.states[g], ", "),
-                                                   s.gait_share[g]));
+    lines.emplace_back(
+        s.period > 1 ? "a gait, or this one later" : "another gait",
+        fmt::format("at {:.6g}: {:.3g} of the steps", fmt::join(s.gaits.states[g], ", "), s.gait_share[g]));
   lines.emplace_back("relative errors", fmt::format("shifts {:.2g}, discretization {:.2g}, leaving the mesh {:.2g}",
                                                     s.shift_error, s.discretization_error, s.bracket));
   const double blind = std::max(s.blind_spots.missed, s.blind_spots.imagined);
@@ -145,12 +151,27 @@ std::string lines_text(const std::string& head, const Lines& lines) {
   return text;
 }
 
+// Tells of the orbit around which a mesh lies; of one of several phases, of each.
+void add_orbit_lines(Lines& lines, const std::vector<std::string>& names, const markov::MeshStudy& study) {
+  if (study.period > 1) lines.emplace_back("gait: period", fmt::format("{} steps", study.orbit.frames.size()));
+  for (std::size_t phase = 0; phase < study.orbit.frames.size(); ++phase)
+    for (std::size_t k = 0; k < names.size(); ++k)
+      lines.emplace_back(
+          fmt::format("gait{}: {}", study.orbit.frames.size() > 1 ? fmt::format(", phase {}", phase) : "", names[k]),
+          fmt::format("{:.9g}", study.orbit.frames[phase].centre[k]));
+  lines.emplace_back("gait: eigenvalues", eigenvalues_text(study.orbit.eigenvalues));
+}
+
 std::string study_lines(const WalkerSetting& setting, const WalkerStudy& study) {
   Lines lines = head_lines(study.passage);
   const std::vector<std::string> names = setting.map().names();
-  for (std::size_t k = 0; k < study.gait.state.size(); ++k)
-    lines.emplace_back("gait: " + names[k], fmt::format("{:.9f}", study.gait.state[k]));
-  lines.emplace_back("gait: eigenvalues", eigenvalues_text(study.gait.eigenvalues));
+  if (study.passage.period > 1) {
+    add_orbit_lines(lines, names, study.passage);
+  } else {
+    for (std::size_t k = 0; k < study.gait.state.size(); ++k)
+      lines.emplace_back("gait: " + names[k], fmt::format("{:.9f}", study.gait.state[k]));
+    lines.emplace_back("gait: eigenvalues", eigenvalues_text(study.gait.eigenvalues));
+  }
   for (auto& line : mesh_lines(study.passage)) lines.push_back(std::move(line));
   return lines_text(setting.describe(), lines);
 }
@@ -188,7 +209,7 @@ std::string walker_json(const WalkerSetting& setting, const WalkerStudy& study,
 
 std::string map_json(const MapStudy& study, const std::optional<LastMoments>& moments, const Provenance& provenance) {
   WalkerJson json = mesh_study_json(study.name, study.passage);
-  json["gait"] = orbit_json(study);
+  json["gait"] = orbit_json(study.names, study.passage);
   return finished(std::move(json), moments, provenance);
 }
 
@@ -213,13 +234,7 @@ std::string walker_text(const WalkerSetting& setting, const WalkerStudy& study,
 
 std::string map_text(const MapStudy& study, const std::optional<LastMoments>& moments, std::size_t width) {
   Lines lines = head_lines(study.passage);
-  const markov::NoiseFreeOrbit& orbit = study.passage.orbit;
-  for (std::size_t phase = 0; phase < orbit.frames.size(); ++phase)
-    for (std::size_t k = 0; k < study.names.size(); ++k)
-      lines.emplace_back(
-          fmt::format("gait{}: {}", orbit.frames.size() > 1 ? fmt::format(", phase {}", phase) : "", study.names[k]),
-          fmt::format("{:.9g}", orbit.frames[phase].centre[k]));
-  lines.emplace_back("gait: eigenvalues", eigenvalues_text(orbit.eigenvalues));
+  add_orbit_lines(lines, study.names, study.passage);
   for (auto& line : mesh_lines(study.passage)) lines.push_back(std::move(line));
   return with_moments(lines_text(study.name, lines), moments, width);
 }

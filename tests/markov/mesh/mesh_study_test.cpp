@@ -2,6 +2,7 @@
 
 #include <gtest/gtest.h>
 
+#include <cmath>
 #include <cstdint>
 #include <utility>
 
@@ -65,6 +66,38 @@ TEST(MeshStudy, PhasesAgreeWithSimulation) {
   ASSERT_TRUE(simulated);
   EXPECT_NEAR(study.steps.value, simulated->mean, 4 * simulated->standard_error);
   EXPECT_EQ(study.disagreement, "");
+}
+
+// The start is an unstable orbit, beside which the map walks on with period two; simulation knows the same.
+TEST(MeshStudy, FollowsGaitsThatComeBackAfterTwoSteps) {
+  for (const double sd : {0.4, 0.3, 0.25}) {  // 228 to 2.1e4 steps
+    const MeshStudy study = mesh_study(cubic_batch(sd), std::vector<double>{0}, quick());
+    const double exact = cubic_steps(sd, 1, 400);
+    EXPECT_EQ(study.period, 2);
+    EXPECT_EQ(study.disagreement, "");
+    EXPECT_NEAR(std::abs(study.orbit.frames[0].centre[0]), 1, 1e-9);
+    EXPECT_NEAR(study.steps.value / exact, 1, 0.003) << sd;
+    EXPECT_LE(study.steps.lower, exact * 1.0005) << sd;
+    EXPECT_GE(study.steps.upper, exact * 0.9995) << sd;
+    EXPECT_EQ(study.simulated.has_value(), sd == 0.4);  // by 100,000 steps
+  }
+}
+
+// Logistic maps x' = r x (1 - x) have stable cycles of 2 at r = 3.2, of 4 at 3.5, of 3 at 3.83 and none at 3.9.
+TEST(PeriodicGait, FindsThePeriodsOfLogisticMaps) {
+  const auto logistic = [](double r) {
+    BatchMap map;
+    map.step = [r](int, auto states, auto scores, auto next, auto failed) {
+      for (std::size_t i = 0; i < failed.size(); ++i) next[i] = r * states[i] * (1 - states[i]) + 1e-3 * scores[i];
+    };
+    return map;
+  };
+  for (const auto& [r, period] : {std::pair{2.5, 1}, {3.2, 2}, {3.5, 4}, {3.83, 3}, {3.9, 0}}) {
+    const auto gait = periodic_gait(logistic(r), std::vector<double>{1 - 1 / r});
+    EXPECT_EQ(gait ? gait->period : 0, period) << r;
+  }
+  // From 4 (1 + 1e-6) / 4 it leaves the unit interval, and the finite numbers after that.
+  EXPECT_FALSE(periodic_gait(logistic(4), std::vector<double>{1}));
 }
 
 TEST(MeshStudy, SaysWhereTheWaysDisagree) {
