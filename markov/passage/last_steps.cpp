@@ -13,7 +13,7 @@ namespace metastable::markov {
 namespace {
 
 constexpr double log_of_zero = -std::numeric_limits<double>::infinity();
-constexpr std::size_t eliminated = 3000;  // states
+constexpr std::size_t eliminated_states = 3000;
 constexpr int product_limit = 100000;
 constexpr double exact = 1e-11;  // relative
 
@@ -116,45 +116,57 @@ LastSteps last_steps(const Chain& chain, std::span<const double> visits, int ste
   return last;
 }
 
-PassageTo passage_to(const Chain& chain, std::span<const std::uint8_t> set) {
+void PassageQuestion::answer(std::span<const double> reach, std::span<const double> fail,
+                             std::span<const double> steps) {
+  for (std::size_t n = 0; n < undecided.size(); ++n) {
+    passage.reach[undecided[n]] = reach[n];
+    passage.fail[undecided[n]] = fail[n];
+    if (must[n]) passage.steps[undecided[n]] = steps[n];
+  }
+}
+
+PassageQuestion passage_question(const Chain& chain, std::span<const std::uint8_t> set) {
   require_size("set", set.size(), chain);
-  PassageTo passage;
+  PassageQuestion question;
+  PassageTo& passage = question.passage;
   passage.reach.assign(set.begin(), set.end());
   passage.fail.assign(set.size(), 0.0);
   passage.steps.assign(set.size(), 0.0);
-  std::vector<std::uint32_t> outside, undecided;
+  std::vector<std::uint32_t> outside;
   for (std::size_t i = 0; i < set.size(); ++i)
     if (!set[i]) outside.push_back(static_cast<std::uint32_t>(i));
   const Reachability either = classify(chain.restricted_to(outside));
-  std::vector<std::uint8_t> must;
   for (std::size_t n = 0; n < outside.size(); ++n) {
     if (!either.must_rest[n]) passage.steps[outside[n]] = std::numeric_limits<double>::infinity();
-    if (either.can_rest[n]) undecided.push_back(outside[n]), must.push_back(either.must_rest[n]);
+    if (!either.can_rest[n]) continue;
+    question.undecided.push_back(outside[n]);
+    question.must.push_back(either.must_rest[n]);
   }
-  if (undecided.empty()) return passage;
-  std::vector<double> to_set(undecided.size(), 0.0), kill, ones(undecided.size(), 1.0);
-  for (std::size_t n = 0; n < undecided.size(); ++n) {
-    kill.push_back(chain.kill(undecided[n]));
-    const auto columns = chain.columns(undecided[n]);
+  for (const std::uint32_t i : question.undecided) {
+    question.kill.push_back(chain.kill(i));
+    question.to_set.push_back(0);
+    const auto columns = chain.columns(i);
     for (std::size_t e = 0; e < columns.size(); ++e)
-      if (set[columns[e]]) to_set[n] += chain.values(undecided[n])[e];
+      if (set[columns[e]]) question.to_set.back() += chain.values(i)[e];
   }
-  const Chain inside = chain.restricted_to(undecided);
+  question.inside = chain.restricted_to(question.undecided);
+  return question;
+}
+
+PassageTo passage_to(const Chain& chain, std::span<const std::uint8_t> set) {
+  PassageQuestion question = passage_question(chain, set);
+  const std::vector<double> ones(question.undecided.size(), 1.0);
   const auto fill = [&](const auto& solve) {
-    const std::vector<double> reach = solve(to_set), fail = solve(kill), steps = solve(ones);
-    for (std::size_t n = 0; n < undecided.size(); ++n) {
-      passage.reach[undecided[n]] = reach[n];
-      passage.fail[undecided[n]] = fail[n];
-      if (must[n]) passage.steps[undecided[n]] = steps[n];
-    }
+    question.answer(solve(question.to_set), solve(question.kill), solve(ones));
   };
-  if (undecided.size() <= eliminated) {
-    const ChainSolver solver = on_states(undecided, [&] { return ChainSolver(inside); });
+  if (question.undecided.empty()) return question.passage;
+  if (question.undecided.size() <= eliminated_states) {
+    const ChainSolver solver = on_states(question.undecided, [&] { return ChainSolver(question.inside); });
     fill([&](const std::vector<double>& rhs) { return solver.solve(rhs); });
   } else {
-    fill([&](const std::vector<double>& rhs) { return by_products(inside, rhs); });
+    fill([&](const std::vector<double>& rhs) { return by_products(question.inside, rhs); });
   }
-  return passage;
+  return question.passage;
 }
 
 }  // namespace metastable::markov

@@ -39,6 +39,21 @@ struct PassageTo {
   std::vector<double> steps;  ///< expected steps until either; 0 in the set, infinite where neither need come
 };
 
+/// Holds what first passage to a set asks of a chain: the states that are not decided by the structure alone.
+struct PassageQuestion {
+  PassageTo passage;                     ///< of the others
+  std::vector<std::uint32_t> undecided;  ///< ascending
+  Chain inside;                          ///< on these; its kill rates lead to the set or to failure
+  std::vector<double> to_set, kill;      ///< the two parts of these
+  std::vector<std::uint8_t> must;        ///< whether the set or failure must come
+
+  /// Fills in what has been solved for: (I - Q) x = to_set, kill, 1.
+  void answer(std::span<const double> reach, std::span<const double> fail, std::span<const double> steps);
+};
+
+/// O(entries). @throws std::invalid_argument for a set of another size
+PassageQuestion passage_question(const Chain& chain, std::span<const std::uint8_t> set);
+
 /// Solves the chain outside of the set, by elimination up to 3000 states, beyond them by products. Where neither the
 /// set nor failure can be reached, both probabilities are 0.
 /// @param set  one entry a state, 1 for those of the set

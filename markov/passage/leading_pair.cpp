@@ -8,6 +8,8 @@
 #include <numeric>
 #include <optional>
 
+#include "markov/chain/generator_solver.h"
+
 namespace metastable::markov {
 namespace {
 
@@ -37,7 +39,7 @@ struct ClassPair {
 /// Returns how long, at most, walkers of the killed-free generator take to its most visited state, forwards or
 /// backwards in time, and the state from which: about one over the distance of the next eigenvalue.
 std::pair<Extended, std::uint32_t> slowest_return(const Generator& closed, const Row& stationary,
-                                                  std::uint32_t most_visited) {
+                                                  std::uint32_t most_visited, const Heard& heard) {
   States others;
   Row weight;
   for (std::uint32_t i = 0; i < closed.size(); ++i) {
@@ -48,8 +50,8 @@ std::pair<Extended, std::uint32_t> slowest_return(const Generator& closed, const
   Generator without = closed;
   std::fill(without.kill.begin(), without.kill.end(), Extended{0});
   std::vector<std::uint32_t> scratch(closed.size(), Generator::outside);
-  const GeneratorFactors factors(without.restricted_to(others, scratch));
-  const Row forwards = factors.solve(Row(others.size(), 1)), backwards = factors.solve_left(weight);
+  GeneratorSolver solver(without.restricted_to(others, scratch), heard, weight);
+  const Row forwards = solver.solve(Row(others.size(), 1)), backwards = solver.solve_left(weight);
   std::pair<Extended, std::uint32_t> slowest{0, most_visited};
   for (std::size_t k = 0; k < others.size(); ++k) {
     const Extended time = std::max(forwards[k], weight[k] > 0 ? backwards[k] / weight[k] : 0);
@@ -70,7 +72,7 @@ Extended move_up(Generator& scaled, const Row& steps, Extended longest) {
 }
 
 /// @param base  what has been taken off all kill rates
-ClassPair pair_of_class(Generator scaled, const States& states, Extended base) {
+ClassPair pair_of_class(Generator scaled, const States& states, Extended base, const Heard& heard) {
   const std::size_t n = scaled.size();
   ClassPair pair;
   if (n == 1) {
@@ -83,9 +85,12 @@ ClassPair pair_of_class(Generator scaled, const States& states, Extended base) {
   for (Extended& kill : scaled.kill) kill -= common;
   pair.right.assign(n, 1);
   Extended change = 0;
+  Row visits;
   for (Extended before = 1;; before = change) {
     if (std::all_of(scaled.kill.begin(), scaled.kill.end(), [](Extended kill) { return kill == 0; })) break;
-    const Row steps = GeneratorFactors(scaled).solve(Row(n, 1));
+    GeneratorSolver solver(scaled, heard, visits);
+    const Row steps = solver.solve(Row(n, 1));
+    visits.assign(solver.visits().begin(), solver.visits().end());
     const auto [least, longest] = std::minmax_element(steps.begin(), steps.end());
     const Extended most = *longest;
     change = (most - *least) / *least;
@@ -96,13 +101,13 @@ ClassPair pair_of_class(Generator scaled, const States& states, Extended base) {
     excess += move_up(scaled, steps, most);
     if (change <= same_vector && before <= same_vector) break;
   }
-  const Row stationary = stationary_vector(scaled);
+  const Row stationary = stationary_distribution(scaled, heard, visits);
   excess += std::inner_product(stationary.begin(), stationary.end(), scaled.kill.begin(), Extended{0});
   pair.rate = common + excess;
   pair.exact = excess == 0;
   const auto most_visited =
       static_cast<std::uint32_t>(std::max_element(stationary.begin(), stationary.end()) - stationary.begin());
-  const auto [time, from] = slowest_return(scaled, stationary, most_visited);
+  const auto [time, from] = slowest_return(scaled, stationary, most_visited, heard);
   const Extended error = std::max(change <= same_vector ? change * change : 0, rate_rounding * excess * time);
   if (!(error <= undecided))
     throw NotUnique(states[most_visited], states[from], static_cast<double>(base + pair.rate), false);
@@ -117,8 +122,11 @@ ClassPair pair_of_class(Generator scaled, const States& states, Extended base) {
 /// is taken off before the rates of leaving the class are added, which may be far smaller.
 class Classes {
  public:
-  explicit Classes(const Generator& generator)
-      : all_(generator), states_(communicating_classes(generator)), class_of_(generator.size()) {
+  Classes(const Generator& generator, Heard heard)
+      : heard_(std::move(heard)),
+        all_(generator),
+        states_(communicating_classes(generator)),
+        class_of_(generator.size()) {
     std::vector<std::uint32_t> scratch(generator.size(), Generator::outside);
     for (std::size_t c = 0; c < states_.size(); ++c) {
       Extended base = std::numeric_limits<Extended>::infinity();
@@ -176,7 +184,7 @@ class Classes {
                      [&](std::size_t a, std::size_t b) { return base_[a] + least[a] < base_[b] + least[b]; });
     for (const std::size_t c : order) {
       if (beyond_lowest(c, least[c]) > tolerance(least[c])) continue;
-      pairs_[c] = pair_of_class(parts_[c], states_[c], base_[c]);
+      pairs_[c] = pair_of_class(parts_[c], states_[c], base_[c], heard_);
       if (beyond_lowest(c, pairs_[c]->rate) > 0) continue;
       lowest_ = c;
       lowest_rate_ = pairs_[c]->rate;
@@ -279,13 +287,14 @@ class Classes {
       for (Extended& kill : shifted.kill) kill = beyond_lowest(d, kill);
     }
     for (std::size_t i = 0; i < rhs.size(); ++i) rhs[i] = left ? rhs[i] * scale[i] : rhs[i] / scale[i];
-    const GeneratorFactors factors(shifted);
-    const Row solved = left ? factors.solve_left(rhs) : factors.solve(rhs);
+    GeneratorSolver solver(shifted, heard_);
+    const Row solved = left ? solver.solve_left(rhs) : solver.solve(rhs);
     for (std::size_t i = 0; i < states.size(); ++i)
       vector[states[i]] = left ? solved[i] / scale[i] : solved[i] * scale[i];
     return true;
   }
 
+  Heard heard_;
   Generator all_;  ///< without the bases
   std::vector<States> states_;
   std::vector<std::size_t> class_of_;
@@ -309,6 +318,6 @@ NotUnique::NotUnique(std::uint32_t one, std::uint32_t other, double rate, bool e
       rate_(rate),
       equal_(equal) {}
 
-LeadingPair leading_pair(const Generator& generator) { return Classes(generator).lead(); }
+LeadingPair leading_pair(const Generator& generator, const Heard& heard) { return Classes(generator, heard).lead(); }
 
 }  // namespace metastable::markov

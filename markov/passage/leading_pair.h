@@ -4,6 +4,7 @@
 #include <vector>
 
 #include "markov/chain/generator.h"
+#include "markov/chain/iterated_solver.h"
 
 namespace metastable::markov {
 
@@ -43,9 +44,9 @@ struct LeadingPair {
 /// for its expected steps w, x becomes x w, and 1 / w_i - min 1 / w are the kill rates of the next one. So shift and
 /// kill rates are known relative to what is left of the rate, never to the rates within the class, and the left vector
 /// follows as a stationary one. The class with the smallest rate leads; the classes after and before it follow by one
-/// solve each. Costs about ten eliminations in extended precision.
+/// solve each. Costs about ten eliminations in extended precision, or iterations where GeneratorSolver prefers them.
 /// @throws NotUnique where classes of equal rate lead to different vectors, or the rates of two groups of states agree
 /// so closely that rounding decides between them: names a state of each
-LeadingPair leading_pair(const Generator& generator);
+LeadingPair leading_pair(const Generator& generator, const Heard& heard = {});
 
 }  // namespace metastable::markov

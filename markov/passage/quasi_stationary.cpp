@@ -260,18 +260,23 @@ QuasiStationary of_all_classes(const ChainSolver& solver, const IteratedPair& pa
   return quasi;
 }
 
+QuasiStationary of_whole_chain(const LeadingPair& exact) {
+  const auto rate = static_cast<double>(exact.rate);
+  return {{exact.left.begin(), exact.left.end()},
+          {exact.right.begin(), exact.right.end()},
+          rate,
+          rate,
+          exact.iterations,
+          exact.error};
+}
+
 /// Takes the chain as it is, or, where that would take long, watched once a revolution.
 QuasiStationary by_classes(const ChainSolver& solver) {
   const Period& period = solver.period();
   if (period.period == 1 || solver.chain().size() <= whole) {
-    const LeadingPair exact = leading_pair(generator_of(solver.chain()));
-    const auto rate = static_cast<double>(exact.rate);
-    return {{exact.left.begin(), exact.left.end()},
-            {exact.right.begin(), exact.right.end()},
-            rate,
-            period.period == 1 ? rate : -std::expm1(period.period * std::log1p(-rate)),
-            exact.iterations,
-            exact.error};
+    QuasiStationary quasi = of_whole_chain(leading_pair(generator_of(solver.chain())));
+    if (period.period > 1) quasi.revolution_failure_rate = -std::expm1(period.period * std::log1p(-quasi.failure_rate));
+    return quasi;
   }
   try {
     const LeadingPair exact = leading_pair(generator_of(solver.revolution()));
@@ -303,11 +308,15 @@ double residual_of(const Generator& generator, Extended rate, const std::vector<
 }
 
 /// Returns the larger residual of both vectors, and what is known of their error.
-double residual_of(const ChainSolver& solver, const QuasiStationary& quasi) {
-  const Generator generator = generator_of(solver.chain());
+double residual_of(const Generator& generator, const QuasiStationary& quasi) {
   const auto rate = static_cast<Extended>(quasi.failure_rate);
   return std::max({quasi.residual, residual_of(generator, rate, quasi.distribution, true),
                    residual_of(generator, rate, quasi.survival_weight, false)});
+}
+
+void require_small_residual(const QuasiStationary& quasi) {
+  if (!(quasi.residual <= worst_residual))
+    throw ConvergenceError("inverse iteration", quasi.residual, "the vectors found are not those of the chain");
 }
 
 std::vector<std::uint32_t> marked_states(const std::vector<std::uint8_t>& marked) {
@@ -376,14 +385,28 @@ QuasiStationary quasi_stationary(const ChainSolver& solver, FewSurvivors few) {
       QuasiStationary quasi = of_all_classes(solver, *pair);
       if (unsettled || revolution.interpolated()) return quasi;
       // Entries far below the largest settle later than the others, and are not watched.
-      quasi.residual = residual_of(solver, quasi);
+      quasi.residual = residual_of(generator_of(solver.chain()), quasi);
       if (quasi.residual <= same_end) return quasi;
     }
   }
   QuasiStationary quasi = by_classes(solver);
-  quasi.residual = residual_of(solver, quasi);
-  if (!(quasi.residual <= worst_residual))
-    throw ConvergenceError("inverse iteration", quasi.residual, "the vectors found are not those of the chain");
+  quasi.residual = residual_of(generator_of(solver.chain()), quasi);
+  require_small_residual(quasi);
+  return quasi;
+}
+
+QuasiStationary quasi_stationary_as_a_whole(const Chain& chain, LeadingPair& pair, const Heard& heard) {
+  if (chain.size() == 0) throw std::invalid_argument("quasi-stationary distribution: the chain has no states");
+  if (never_returns(chain)) {
+    IteratedPair last = last_survivors(chain);
+    pair = {{last.left.begin(), last.left.end()}, {last.right.begin(), last.right.end()}, 1, last.iterations, 0};
+    return {std::move(last.left), std::move(last.right), 1, 1, last.iterations, 0};
+  }
+  const Generator generator = generator_of(chain);
+  pair = leading_pair(generator, heard);
+  QuasiStationary quasi = of_whole_chain(pair);
+  quasi.residual = residual_of(generator, quasi);
+  require_small_residual(quasi);
   return quasi;
 }
 

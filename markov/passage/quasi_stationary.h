@@ -46,6 +46,11 @@ enum class FewSurvivors { as_others, unsettled };
 /// residual exceeds 1e-8.
 QuasiStationary quasi_stationary(const ChainSolver& solver, FewSurvivors few = FewSurvivors::as_others);
 
+/// Finds the same for the whole of a chain by leading_pair(), cyclic ones too, whose classes are not told apart.
+/// @param pair  receives both vectors in extended precision
+/// @throws NotUnique; ConvergenceError where the residual exceeds 1e-8
+QuasiStationary quasi_stationary_as_a_whole(const Chain& chain, LeadingPair& pair, const Heard& heard = {});
+
 /// Scales the entries of every cyclic class of a distribution to sum to one; classes without any stay 0.
 std::vector<double> shares_in_classes(const Period& period, std::vector<double> distribution);
 

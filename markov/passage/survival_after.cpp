@@ -25,18 +25,6 @@ constexpr double start_tolerance = 1e-9;
 
 double sum_of(std::span<const double> v) { return std::accumulate(v.begin(), v.end(), 0.0); }
 
-void check(const Chain& chain, std::span<const double> start, std::span<const double> steps) {
-  if (chain.interpolated()) throw std::invalid_argument("survival: interpolated chains are not taken");
-  if (start.size() != chain.size())
-    throw std::invalid_argument(fmt::format("start: {} probabilities given for {} states", start.size(), chain.size()));
-  for (std::size_t i = 0; i < start.size(); ++i)
-    if (!(start[i] >= 0)) throw std::invalid_argument(fmt::format("start: {} for state {} is below 0", start[i], i));
-  if (!(std::abs(sum_of(start) - 1) <= start_tolerance))
-    throw std::invalid_argument(fmt::format("start: probabilities sum to {:.12g}, 1 expected", sum_of(start)));
-  for (const double n : steps)
-    if (!(n >= 0)) throw std::invalid_argument(fmt::format("steps: {} is below 0", n));
-}
-
 /// Follows survivors for up to `last` steps; returns P(steps > n) for n = 0 .. last.
 std::vector<double> followed(const Chain& chain, std::span<const double> start, std::size_t last) {
   std::vector<double> at{1}, survivors(start.begin(), start.end());
@@ -129,9 +117,21 @@ double never(const Chain& chain, std::span<const double> start) {
 
 }  // namespace
 
+void check_survival(const Chain& chain, std::span<const double> start, std::span<const double> steps) {
+  if (chain.interpolated()) throw std::invalid_argument("survival: interpolated chains are not taken");
+  if (start.size() != chain.size())
+    throw std::invalid_argument(fmt::format("start: {} probabilities given for {} states", start.size(), chain.size()));
+  for (std::size_t i = 0; i < start.size(); ++i)
+    if (!(start[i] >= 0)) throw std::invalid_argument(fmt::format("start: {} for state {} is below 0", start[i], i));
+  if (!(std::abs(sum_of(start) - 1) <= start_tolerance))
+    throw std::invalid_argument(fmt::format("start: probabilities sum to {:.12g}, 1 expected", sum_of(start)));
+  for (const double n : steps)
+    if (!(n >= 0)) throw std::invalid_argument(fmt::format("steps: {} is below 0", n));
+}
+
 std::vector<double> survival_after(const Chain& chain, std::span<const double> start, std::span<const double> steps,
                                    int threads) {
-  check(chain, start, steps);
+  check_survival(chain, start, steps);
   const double entries = static_cast<double>(chain.entries() + chain.size());
   const bool doubles = chain.size() <= doubled_states;
   const double most = doubles ? followed_steps : std::max(followed_steps, std::floor(followed_products / entries));

@@ -8,6 +8,9 @@
 
 namespace metastable::markov {
 
+/// @throws std::invalid_argument for what survival_after() does not take
+void check_survival(const Chain& chain, std::span<const double> start, std::span<const double> steps);
+
 /// Returns P(no rest within n steps) for each n of `steps`, from a distribution over the states. Up to 4096 steps are
 /// followed one by one, further ones by doubling the chain, whose failure probabilities are sums of products
 /// throughout, O(states^3) a doubling. On more than 512 states as many as take 2e8 products are followed, further ones

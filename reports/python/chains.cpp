@@ -2,15 +2,17 @@
 
 #include <fmt/format.h>
 
+#include <chrono>
 #include <cmath>
-#include <limits>
 #include <memory>
 #include <optional>
 #include <stdexcept>
 
 #include "markov/chain/chain.h"
-#include "markov/chain/eigenpairs.h"
+#include "markov/chain/envelope.h"
 #include "markov/chain/solver.h"
+#include "markov/passage/bounded_passage.h"
+#include "markov/passage/bounded_survival.h"
 #include "markov/passage/first_passage.h"
 #include "markov/passage/last_steps.h"
 #include "markov/passage/quasi_stationary.h"
@@ -27,29 +29,57 @@ using Number = py::array_t<double, py::array::c_style | py::array::forcecast>;
 /// A chain with its factors, made at the first question that needs them.
 class HeldChain {
  public:
-  HeldChain(markov::Chain chain, int threads) : chain_(std::move(chain)), threads_(threads) {}
+  HeldChain(markov::Chain chain, int threads, double memory_gb, double time_limit)
+      : chain_(std::move(chain)),
+        threads_(threads),
+        time_limit_(time_limit),
+        way_(markov::way_of(chain_, memory_gb * 1e9)) {}
   const markov::Chain& chain() const { return chain_; }
   int threads() const { return threads_; }
+  double time_limit() const { return time_limit_; }
+  bool iterates() const { return way_ == markov::Way::iterated; }
   const markov::ChainSolver& solver() {
     if (!solver_) solver_ = std::make_unique<markov::ChainSolver>(chain_, threads_);
     return *solver_;
   }
-  const markov::QuasiStationary& quasi_stationary() {
-    if (!quasi_) quasi_ = markov::quasi_stationary(solver());
+  const markov::BoundedQuasiStationary& quasi_stationary(const markov::Heard& heard) {
+    if (!quasi_) quasi_ = iterates() ? bounded_quasi_stationary(chain_, heard) : eliminated_quasi_stationary();
     return *quasi_;
   }
 
  private:
+  markov::BoundedQuasiStationary eliminated_quasi_stationary() {
+    markov::BoundedQuasiStationary found{markov::quasi_stationary(solver()), 0, 1};
+    markov::enclose_rate(chain_, markov::split(found.quasi.survival_weight), found);
+    return found;
+  }
+
   markov::Chain chain_;
   int threads_;
+  double time_limit_;
+  markov::Way way_;
   std::unique_ptr<markov::ChainSolver> solver_;
-  std::optional<markov::QuasiStationary> quasi_;
+  std::optional<markov::BoundedQuasiStationary> quasi_;
 };
+
+// Listens for Ctrl-C and for the end of the time.
+markov::Heard listening(Call& call, double time_limit, const char* doing) {
+  const auto began = std::chrono::steady_clock::now();
+  return [&call, time_limit, doing, began] {
+    call.tell(0, doing);
+    const std::chrono::duration<double> spent = std::chrono::steady_clock::now() - began;
+    if (spent.count() > time_limit)
+      throw std::runtime_error(fmt::format("chain: {} was not done after {:g} s (time_limit)", doing, time_limit));
+  };
+}
 
 // Takes rows of compressed storage, columns ascending; the diagonal is looked at and left out. Where a row gives its
 // own, it has to be what is left in every row; where none does, it is understood.
-HeldChain chain_of(const Index& starts, const Index& columns, const Number& values, const Number& kill, int threads) {
+HeldChain chain_of(const Index& starts, const Index& columns, const Number& values, const Number& kill, int threads,
+                   double memory_gb, double time_limit) {
   constexpr double sum_tolerance = 1e-9;
+  if (!(memory_gb > 0)) throw std::invalid_argument(fmt::format("memory_gb: {:g}, more than 0 expected", memory_gb));
+  if (!(time_limit > 0)) throw std::invalid_argument(fmt::format("time_limit: {:g}, more than 0 expected", time_limit));
   const auto n = static_cast<std::size_t>(kill.size());
   std::vector<std::size_t> row_start{0};
   std::vector<std::uint32_t> column;
@@ -71,7 +101,7 @@ HeldChain chain_of(const Index& starts, const Index& columns, const Number& valu
   }
   HeldChain held{markov::Chain(std::move(row_start), std::move(column), std::move(value),
                                std::vector<double>(kill.data(), kill.data() + n)),
-                 threads};
+                 threads, memory_gb, time_limit};
   for (std::size_t i = 0; i < n && given; ++i)
     if (!(std::abs(sums[i] - 1) <= sum_tolerance))
       throw std::invalid_argument(
@@ -80,67 +110,38 @@ HeldChain chain_of(const Index& starts, const Index& columns, const Number& valu
   return held;
 }
 
-struct Bounds {
-  std::vector<double> lower, upper;
-};
-
-// Returns bounds of the expected steps m, (I - Q) m = 1: with v the answer and r = v - Q v, v / max r <= m <= v / min
-// r, because (I - Q)^-1 has no negative entry. It takes r in extended precision, as kill v + sum q (v_i - v_j), with
-// the rounding of that.
-Bounds enclosed(const markov::Chain& chain, const std::vector<double>& v) {
-  constexpr long double eps = std::numeric_limits<long double>::epsilon();
-  long double low = std::numeric_limits<long double>::infinity(), high = 0;
-  for (std::size_t i = 0; i < chain.size(); ++i) {
-    const long double own = v[i];
-    long double residual = own * chain.kill(i), size = residual;
-    const auto columns = chain.columns(i);
-    const auto values = chain.values(i);
-    for (std::size_t k = 0; k < columns.size(); ++k) {
-      const long double part = values[k] * (own - v[columns[k]]);
-      residual += part;
-      size += std::abs(part);
-    }
-    const long double error = 2 * eps * static_cast<long double>(columns.size() + 2) * size;
-    low = std::min(low, residual - error);
-    high = std::max(high, residual + error);
-  }
-  Bounds bounds;
-  constexpr double out = 4 * std::numeric_limits<double>::epsilon();
-  for (const double value : v) {
-    bounds.lower.push_back(static_cast<double>(value / high) * (1 - out));
-    bounds.upper.push_back(low > 0 ? static_cast<double>(value / low) * (1 + out)
-                                   : std::numeric_limits<double>::infinity());
-  }
-  return bounds;
-}
-
 py::dict first_passage(HeldChain& held, const py::object& progress) {
-  std::vector<double> mean, sd;
-  Bounds bounds;
+  markov::BoundedSteps steps;
   Call call(progress);
   call.run([&] {
-    mean = markov::mean_first_passage(held.solver());
-    sd = markov::first_passage_sd(held.solver(), mean);
-    bounds = enclosed(held.chain(), mean);
+    if (held.iterates()) {
+      steps = markov::bounded_first_passage(held.chain(), listening(call, held.time_limit(), "first passage"));
+      return;
+    }
+    steps.mean = markov::mean_first_passage(held.solver());
+    steps.sd = markov::first_passage_sd(held.solver(), steps.mean);
+    steps.bounds = markov::steps_enclosed(held.chain(), markov::split(steps.mean));
   });
   py::dict told;
-  told["mean"] = array_of(std::move(mean));
-  told["sd"] = array_of(std::move(sd));
-  told["lower"] = array_of(std::move(bounds.lower));
-  told["upper"] = array_of(std::move(bounds.upper));
+  told["mean"] = array_of(std::move(steps.mean));
+  told["sd"] = array_of(std::move(steps.sd));
+  told["lower"] = array_of(std::move(steps.bounds.lower));
+  told["upper"] = array_of(std::move(steps.bounds.upper));
   return told;
 }
 
 py::dict quasi_stationary(HeldChain& held, const py::object& progress) {
   Call call(progress);
-  markov::QuasiStationary q;
-  call.run([&] { q = held.quasi_stationary(); });
+  markov::BoundedQuasiStationary found;
+  call.run([&] { found = held.quasi_stationary(listening(call, held.time_limit(), "quasi-stationary")); });
   py::dict told;
-  told["distribution"] = array_of(std::move(q.distribution));
-  told["survival_weight"] = array_of(std::move(q.survival_weight));
-  told["failure_rate"] = q.failure_rate;
-  told["residual"] = q.residual;
-  told["iterations"] = q.iterations;
+  told["distribution"] = array_of(std::move(found.quasi.distribution));
+  told["survival_weight"] = array_of(std::move(found.quasi.survival_weight));
+  told["failure_rate"] = found.quasi.failure_rate;
+  told["lower"] = found.rate_lower;
+  told["upper"] = found.rate_upper;
+  told["residual"] = found.quasi.residual;
+  told["iterations"] = found.quasi.iterations;
   return told;
 }
 
@@ -149,22 +150,34 @@ py::dict committor(const HeldChain& held, const py::array_t<bool, py::array::c_s
   if (static_cast<std::size_t>(set.size()) != held.chain().size())
     throw std::invalid_argument(fmt::format("states: {} marks given for {} states", set.size(), held.chain().size()));
   std::vector<std::uint8_t> marked(set.data(), set.data() + set.size());
-  markov::PassageTo found;
+  markov::BoundedPassage found;
   Call call(progress);
-  call.run([&] { found = markov::passage_to(held.chain(), marked); });
+  call.run([&] {
+    const markov::Heard heard = listening(call, held.time_limit(), "committor");
+    found = held.iterates() ? markov::bounded_passage_to(held.chain(), marked, heard)
+                            : markov::BoundedPassage{markov::passage_to(held.chain(), marked), 0};
+  });
   py::dict told;
-  told["reach"] = array_of(std::move(found.reach));
-  told["fail"] = array_of(std::move(found.fail));
-  told["steps"] = array_of(std::move(found.steps));
+  told["reach"] = array_of(std::move(found.passage.reach));
+  told["fail"] = array_of(std::move(found.passage.fail));
+  told["steps"] = array_of(std::move(found.passage.steps));
+  told["error"] = held.iterates() ? py::cast(found.error) : py::none();
   return told;
 }
 
-py::array survival(const HeldChain& held, const Number& start, const Number& steps, const py::object& progress) {
+py::array survival(HeldChain& held, const Number& start, const Number& steps, const py::object& progress) {
   const std::vector<double> from(start.data(), start.data() + start.size()),
       after(steps.data(), steps.data() + steps.size());
   std::vector<double> at;
   Call call(progress);
-  call.run([&] { at = markov::survival_after(held.chain(), from, after, held.threads()); });
+  call.run([&] {
+    const markov::Heard heard = listening(call, held.time_limit(), "survival");
+    at = held.iterates()
+             ? markov::bounded_survival_after(
+                   held.chain(), from, after,
+                   [&]() -> const markov::QuasiStationary& { return held.quasi_stationary(heard).quasi; }, heard)
+             : markov::survival_after(held.chain(), from, after, held.threads());
+  });
   return array_of(std::move(at));
 }
 

@@ -383,17 +383,20 @@ class QuasiStationary(Record):
     distribution: Floats
     survival_weight: Floats
     failure_rate: float
+    lower: float
+    upper: float
     residual: float
     iterations: int
-    def __init__(self, distribution: Floats, survival_weight: Floats, failure_rate: float, residual: float,
-                 iterations: int) -> None: ...
+    def __init__(self, distribution: Floats, survival_weight: Floats, failure_rate: float, lower: float, upper: float,
+                 residual: float, iterations: int) -> None: ...
 
 
 class Passage(Record):
     reach: Floats
     fail: Floats
     steps: Floats
-    def __init__(self, reach: Floats, fail: Floats, steps: Floats) -> None: ...
+    error: Optional[float]
+    def __init__(self, reach: Floats, fail: Floats, steps: Floats, error: Optional[float]) -> None: ...
 
 
 class Chain:
@@ -516,4 +519,4 @@ def runs(machine: Machine, data: Any = None, *, outcome: Any = None, labels: Any
          inputs: Optional[Mapping[str, ArrayLike]] = None, **columns: Any) -> Runs: ...
 
 
-def chain(matrix: Any, kill: ArrayLike, *, threads: int = 0) -> Chain: ...
+def chain(matrix: Any, kill: ArrayLike, *, memory_gb: float = 2, time_limit: float = 900, threads: int = 0) -> Chain: ...

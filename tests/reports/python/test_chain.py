@@ -47,6 +47,32 @@ class Chains(unittest.TestCase):
         np.testing.assert_allclose(chain.committor([0, 1, 2]).reach[3:], away, rtol=1e-11)
         np.testing.assert_array_equal(chain.committor(into).reach[:3], 1)
 
+    @unittest.skipIf(scipy is None, "SciPy is not there")
+    def test_large_chains_are_iterated_within_their_bounds(self):
+        # All rows fail alike: 1 / k expected steps, a failure rate of k, (1 - k)^n survive.
+        n, k = 6000, 1e-9
+        rng = np.random.default_rng(4)
+        matrix = scipy.sparse.csr_matrix((rng.random(10 * n), (np.repeat(np.arange(n), 10), rng.integers(0, n, 10 * n))),
+                                         shape=(n, n))
+        matrix = scipy.sparse.diags((1 - k) / np.asarray(matrix.sum(axis=1)).ravel()) @ matrix
+        chain = metastable.chain(matrix, np.full(n, k))
+        passage = chain.first_passage()
+        np.testing.assert_allclose(passage.mean, 1 / k, rtol=1e-12)
+        self.assertTrue(np.all(passage.lower <= 1 / k) and np.all(1 / k <= passage.upper))
+        self.assertLess((passage.upper / passage.lower).max() - 1, 1e-9)
+        quasi = chain.quasi_stationary()
+        self.assertTrue(quasi.lower <= k * (1 + 1e-12) and k * (1 - 1e-12) <= quasi.upper)
+        np.testing.assert_allclose(chain.survival(0, [1, 1e9, np.inf]), [1 - k, np.exp(1e9 * np.log1p(-k)), 0], rtol=1e-9)
+        to = chain.committor([0])
+        self.assertLess(to.error, 1e-6)
+        np.testing.assert_allclose(to.reach + to.fail, 1, rtol=1e-9)
+        with self.assertRaisesRegex(metastable.ComputationError, "6000 states with .* memory_gb allows 0.001"):
+            metastable.chain(matrix, np.full(n, k), memory_gb=0.001)
+        with self.assertRaisesRegex(metastable.ComputationError, "not done after 1e-06 s"):
+            metastable.chain(matrix, np.full(n, k), time_limit=1e-6).first_passage()
+        with self.assertRaisesRegex(metastable.InputError, "memory_gb: -1"):
+            metastable.chain(matrix, np.full(n, k), memory_gb=-1)
+
     def test_rare_failures_keep_their_digits(self):
         # From 0 to 1 with a, back with b; only state 1 fails, with k: m0 = m1 + 1 / a, m1 = (1 + b / a) / k.
         a, b, k = 0.25, 0.5, 1e-14

@@ -1,0 +1,254 @@
+#include "markov/passage/bounded_passage.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <numeric>
+#include <stdexcept>
+
+namespace metastable::markov {
+namespace {
+
+using Row = std::vector<Extended>;
+
+constexpr Extended extended_rounding = std::numeric_limits<Extended>::epsilon();
+constexpr double outwards = 4 * std::numeric_limits<double>::epsilon();  // a bound as a double
+constexpr double narrow = 1e-9;                                          // bounds that are not refined
+constexpr double enough = 1e-12;    // width of the bounds of a rate that need not be narrower
+constexpr int most_sweeps = 300;    // of a probability
+constexpr Extended swept = 1e-17L;  // residual, of what leaves the state
+
+/// v_i - sum q_ij v_j as a sum of products, and what its rounding may be.
+struct Difference {
+  Extended value = 0, error = 0;
+};
+
+Difference difference(const Chain& chain, std::size_t i, const SplitVector& v) {
+  Extended value = chain.kill(i) * v.base[i] + chain.kill(i) * v.rest[i], size = std::abs(value);
+  const auto columns = chain.columns(i);
+  const auto values = chain.values(i);
+  for (std::size_t e = 0; e < columns.size(); ++e) {
+    const Extended part = values[e] * v.difference(i, columns[e]);
+    value += part;
+    size += std::abs(part);
+  }
+  return {value, 2 * extended_rounding * static_cast<Extended>(columns.size() + 3) * size};
+}
+
+/// Returns the probability of leaving state i.
+Extended leaving(const Chain& chain, std::size_t i) {
+  const auto values = chain.values(i);
+  return std::accumulate(values.begin(), values.end(), static_cast<Extended>(chain.kill(i)));
+}
+
+[[noreturn]] void refuse(const char* what, double bound) {
+  throw ConvergenceError("iteration", bound,
+                         fmt::format("the proven bound of the {} is wider than {:g}, relative", what, widest_bound));
+}
+
+/// Corrects a solution of (I - Q) x = right by what it leaves of the right side. The correction stays apart, so that
+/// neighbours differ by digits that their sums would round.
+SplitVector refined(const Chain& chain, GeneratorSolver& solver, std::span<const Extended> right,
+                    const SplitVector& x) {
+  SplitVector better = x;
+  Row left(right.begin(), right.end());
+  for (std::size_t i = 0; i < left.size(); ++i) {
+    left[i] -= difference(chain, i, x).value;
+    better.base[i] = x.sum(i);
+    const Extended off = (x.base[i] - better.base[i]) + x.rest[i];  // what the sum rounds, |base| above |rest|
+    better.rest[i] = off;
+  }
+  const Row correction = solver.solve(left);
+  for (std::size_t i = 0; i < left.size(); ++i) better.rest[i] += correction[i];
+  return better;
+}
+
+double width(const VectorBounds& bounds) { return bounds.upper[0] / bounds.lower[0] - 1; }
+
+/// What first_passage_sd() solves for, from split means, in units of the largest one.
+Row variance_of_a_step(const Chain& chain, const SplitVector& mean, Extended unit) {
+  const auto square = [&](Extended off) { return off / unit * (off / unit); };
+  Row variance(chain.size());
+  for (std::size_t i = 0; i < chain.size(); ++i) {
+    variance[i] = chain.kill(i) * square(1 - mean.sum(i)) + chain.stay(i) * square(1);
+    for (std::size_t e = 0; e < chain.columns(i).size(); ++e)
+      variance[i] += chain.values(i)[e] * square(1 + mean.difference(chain.columns(i)[e], i));
+  }
+  return variance;
+}
+
+/// Sweeps a probability, (I - Q) v = b, until its small entries follow from the large ones.
+void sweep(const Chain& chain, const Row& right, Row& v, const Heard& heard) {
+  for (int pass = 0; pass < most_sweeps; ++pass) {
+    if (heard) heard();
+    Extended most = 0;
+    for (std::size_t i = 0; i < v.size(); ++i) {
+      Extended arriving = right[i];
+      for (std::size_t e = 0; e < chain.columns(i).size(); ++e) arriving += chain.values(i)[e] * v[chain.columns(i)[e]];
+      const Extended now = arriving / leaving(chain, i);
+      if (now > 0) most = std::max(most, std::abs(now - v[i]) / now);
+      v[i] = now;
+    }
+    if (most <= swept) return;
+  }
+}
+
+/// Bounds the relative error of v, (I - Q) v = right.
+double relative_error(const Chain& chain, GeneratorSolver& solver, const Row& right, const SplitVector& v) {
+  Row leave(chain.size());
+  Extended most = 0;
+  for (std::size_t i = 0; i < leave.size(); ++i) {
+    const Difference one = difference(chain, i, v);
+    leave[i] = leaving(chain, i) * v.sum(i);
+    const Extended off = std::abs(one.value - right[i]) + one.error;
+    if (off > 0) most = std::max(most, off / leave[i]);
+  }
+  const SplitVector z = solver.solve_split(leave);
+  Extended reached = 1, largest = 0;
+  for (std::size_t i = 0; i < leave.size(); ++i) {
+    const Difference one = difference(chain, i, z);
+    if (leave[i] > 0) reached = std::min(reached, (one.value - one.error) / leave[i]);
+    if (v.sum(i) > 0) largest = std::max(largest, z.sum(i) / v.sum(i));
+  }
+  return reached > 0 ? static_cast<double>(most / reached * largest) : std::numeric_limits<double>::infinity();
+}
+
+/// Solves a passage to a set that some states of `inside` enter at once, with probabilities `entering`, and leads a
+/// probability that is structurally zero to none.
+struct Decided {
+  std::vector<double> probability;
+  double error = 0;
+};
+Decided decided(const Chain& inside, GeneratorSolver& solver, const std::vector<double>& entering, const Heard& heard) {
+  // Only states that can come there at all; to be elsewhere is to fail then.
+  const Incoming into = incoming(inside);
+  std::vector<std::uint8_t> comes(inside.size(), 0);
+  std::vector<std::uint32_t> queue;
+  for (std::uint32_t i = 0; i < inside.size(); ++i)
+    if (entering[i] > 0) comes[i] = 1, queue.push_back(i);
+  while (!queue.empty()) {
+    const std::uint32_t at = queue.back();
+    queue.pop_back();
+    for (std::size_t e = into.start[at]; e < into.start[at + 1]; ++e)
+      if (!comes[into.row[e]]) comes[into.row[e]] = 1, queue.push_back(into.row[e]);
+  }
+  const Row right(entering.begin(), entering.end());
+  SplitVector v = solver.solve_split(right);
+  for (std::size_t i = 0; i < right.size(); ++i) v.rest[i] = comes[i] ? std::max<Extended>(0, v.sum(i)) : 0;
+  std::fill(v.base.begin(), v.base.end(), Extended{0});
+  sweep(inside, right, v.rest, heard);
+  Decided decided{{v.rest.begin(), v.rest.end()}, relative_error(inside, solver, right, v)};
+  if (!(decided.error <= widest_bound)) refuse("probabilities", decided.error);
+  return decided;
+}
+
+/// Solves for the expected steps, as narrowly as it takes, and bounds them.
+VectorBounds expected_steps(const Chain& chain, GeneratorSolver& solver, SplitVector& mean) {
+  const Row ones(chain.size(), 1);
+  mean = solver.solve_split(ones);
+  VectorBounds bounds = steps_enclosed(chain, mean);
+  if (!(width(bounds) <= narrow)) {
+    mean = refined(chain, solver, ones, mean);
+    bounds = steps_enclosed(chain, mean);
+  }
+  if (!(width(bounds) <= widest_bound)) refuse("expected steps", width(bounds));
+  return bounds;
+}
+
+}  // namespace
+
+VectorBounds steps_enclosed(const Chain& chain, const SplitVector& v) {
+  Extended low = std::numeric_limits<Extended>::infinity(), high = 0;
+  for (std::size_t i = 0; i < chain.size(); ++i) {
+    const Difference one = difference(chain, i, v);
+    low = std::min(low, one.value - one.error);
+    high = std::max(high, one.value + one.error);
+  }
+  VectorBounds bounds;
+  for (std::size_t i = 0; i < chain.size(); ++i) {
+    bounds.lower.push_back(static_cast<double>(v.sum(i) / high) * (1 - outwards));
+    bounds.upper.push_back(low > 0 ? static_cast<double>(v.sum(i) / low) * (1 + outwards)
+                                   : std::numeric_limits<double>::infinity());
+  }
+  return bounds;
+}
+
+BoundedSteps bounded_first_passage(const Chain& chain, const Heard& heard) {
+  const std::vector<std::uint8_t> can_rest = classify(chain).can_rest;
+  const auto stuck = std::find(can_rest.begin(), can_rest.end(), 0);
+  if (stuck != can_rest.end())
+    throw std::domain_error(
+        fmt::format("chain solver: rest cannot be reached from state {}", stuck - can_rest.begin()));
+  GeneratorSolver solver(generator_of(chain), heard);
+  SplitVector mean;
+  BoundedSteps steps;
+  steps.bounds = expected_steps(chain, solver, mean);
+  Extended unit = 0;
+  for (std::size_t i = 0; i < chain.size(); ++i) {
+    steps.mean.push_back(std::max(1.0, static_cast<double>(mean.sum(i))));
+    unit = std::max(unit, mean.sum(i));
+  }
+  const Row variance = solver.solve(variance_of_a_step(chain, mean, unit));
+  for (const Extended one : variance)
+    steps.sd.push_back(static_cast<double>(unit * std::sqrt(std::max<Extended>(0, one))));
+  return steps;
+}
+
+SplitVector split(std::span<const double> v) { return {Row(v.size(), 0), {v.begin(), v.end()}}; }
+
+void enclose_rate(const Chain& chain, const SplitVector& weight, BoundedQuasiStationary& bounded) {
+  Extended low = std::numeric_limits<Extended>::infinity(), high = 0;
+  for (std::size_t i = 0; i < chain.size(); ++i) {
+    const Extended own = weight.sum(i);
+    if (own < 0) return;
+    if (own == 0) continue;
+    const Difference one = difference(chain, i, weight);
+    low = std::min(low, (one.value - one.error) / own);
+    high = std::max(high, (one.value + one.error) / own);
+  }
+  bounded.rate_lower = std::max(bounded.rate_lower, static_cast<double>(low) * (1 - outwards));
+  bounded.rate_upper = std::min(bounded.rate_upper, static_cast<double>(high) * (1 + outwards));
+}
+
+BoundedQuasiStationary bounded_quasi_stationary(const Chain& chain, const Heard& heard) {
+  BoundedQuasiStationary bounded;
+  LeadingPair pair;
+  bounded.quasi = quasi_stationary_as_a_whole(chain, pair, heard);
+  if (pair.rate == 1 || pair.rate == 0) {
+    bounded.rate_lower = bounded.rate_upper = bounded.quasi.failure_rate;
+    return bounded;
+  }
+  SplitVector weight{Row(chain.size(), 0), pair.right};
+  enclose_rate(chain, weight, bounded);
+  const auto can_rest = classify(chain).can_rest;
+  if (bounded.rate_upper > (1 + enough) * bounded.rate_lower && std::count(can_rest.begin(), can_rest.end(), 0) == 0) {
+    // One more iteration, whose vector is known to more digits of the differences between neighbours.
+    GeneratorSolver solver(generator_of(chain), heard);
+    weight = solver.solve_split(pair.right);
+    enclose_rate(chain, weight, bounded);
+    if (bounded.rate_upper > (1 + narrow) * bounded.rate_lower)
+      enclose_rate(chain, refined(chain, solver, pair.right, weight), bounded);
+  }
+  if (!(bounded.rate_upper <= (1 + widest_bound) * bounded.rate_lower))
+    refuse("failure rate", bounded.rate_upper / bounded.rate_lower - 1);
+  return bounded;
+}
+
+BoundedPassage bounded_passage_to(const Chain& chain, std::span<const std::uint8_t> set, const Heard& heard) {
+  PassageQuestion question = passage_question(chain, set);
+  if (question.undecided.empty()) return {question.passage, 0};
+  const Chain& inside = question.inside;
+  GeneratorSolver solver(generator_of(inside), heard);
+  SplitVector steps;
+  const VectorBounds bounds = expected_steps(inside, solver, steps);
+  const Decided reach = decided(inside, solver, question.to_set, heard),
+                fail = decided(inside, solver, question.kill, heard);
+  std::vector<double> expected;
+  for (std::size_t i = 0; i < inside.size(); ++i) expected.push_back(static_cast<double>(steps.sum(i)));
+  question.answer(reach.probability, fail.probability, expected);
+  return {question.passage, std::max({reach.error, fail.error, bounds.upper[0] / bounds.lower[0] - 1})};
+}
+
+}  // namespace metastable::markov

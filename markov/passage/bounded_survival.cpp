@@ -1,0 +1,152 @@
+#include "markov/passage/bounded_survival.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <memory>
+#include <numeric>
+
+#include "markov/chain/period.h"
+#include "markov/passage/survival_after.h"
+
+namespace metastable::markov {
+namespace {
+
+constexpr double followed_anyhow = 1e9;  // entries times steps
+constexpr double least_followed = 256;   // steps
+constexpr std::size_t most_followed = 20000;
+constexpr double settled_share = 1e-9;  // of every state, relative
+
+/// Survivors of a chain, step by step.
+class Survivors {
+ public:
+  Survivors(const Chain& chain, std::span<const double> start) : chain_(chain), shares_(start.begin(), start.end()) {
+    rescale();
+  }
+  void step() {
+    double failing = 0;
+    for (std::size_t i = 0; i < shares_.size(); ++i) failing += shares_[i] * chain_.kill(i);
+    shares_ = apply_left(chain_, shares_);
+    const double left = rescale();
+    log_survival_ += failing < 0.5 ? std::log1p(-static_cast<long double>(failing)) : std::log(left);
+  }
+  bool any() const { return any_; }
+  const std::vector<double>& shares() const { return shares_; }
+  long double log_survival() const { return log_survival_; }
+  double survival() const { return any_ ? static_cast<double>(std::exp(log_survival_)) : 0; }
+
+ private:
+  double rescale() {
+    const double all = std::accumulate(shares_.begin(), shares_.end(), 0.0);
+    any_ = all > 0;
+    for (double& share : shares_) share /= any_ ? all : 1;
+    return all;
+  }
+  const Chain& chain_;
+  std::vector<double> shares_;
+  long double log_survival_ = 0;
+  bool any_ = true;
+};
+
+/// What survivors in each cyclic class look like once settled.
+class Settled {
+ public:
+  Settled(const Chain& chain, const QuasiStationary& quasi)
+      : quasi_(quasi), period_(find_period(chain)), shares_(shares_in_classes(period_, quasi.distribution)) {
+    of_class_ = in_classes(quasi.distribution);
+  }
+  /// Says whether survivors look so.
+  bool reached(const std::vector<double>& survivors) const {
+    const std::vector<double> mass = in_classes(survivors);
+    double elsewhere = 0;
+    for (std::size_t i = 0; i < survivors.size(); ++i) {
+      const double foretold = mass[class_of(i)] * shares_[i];
+      // Rounding of row sums leaves a few in the class where they were.
+      if (foretold == 0 || mass[class_of(i)] < settled_share)
+        elsewhere += survivors[i];
+      else if (std::abs(survivors[i] - foretold) > settled_share * foretold)
+        return false;
+    }
+    return elsewhere <= settled_share;
+  }
+  /// Returns the log of the probability that such survivors survive `more` steps.
+  double log_survival(const std::vector<double>& survivors, double more) const {
+    const std::vector<double> mass = in_classes(survivors);
+    const auto turn = static_cast<std::size_t>(std::fmod(more, period_.period));
+    double factor = 0;
+    for (std::size_t c = 0; c < mass.size(); ++c)
+      if (mass[c] > 0) factor += mass[c] * of_class_[(c + turn) % mass.size()] / of_class_[c];
+    return more * std::log1p(-quasi_.failure_rate) + std::log(factor);
+  }
+
+ private:
+  std::size_t class_of(std::size_t i) const { return static_cast<std::size_t>(period_.state_class[i]); }
+  std::vector<double> in_classes(const std::vector<double>& v) const {
+    std::vector<double> mass(period_.classes.size(), 0.0);
+    for (std::size_t i = 0; i < v.size(); ++i) mass[class_of(i)] += v[i];
+    return mass;
+  }
+  const QuasiStationary& quasi_;
+  Period period_;
+  std::vector<double> shares_, of_class_;
+};
+
+/// Returns the probability of never coming to rest.
+double never(const Chain& chain, std::span<const double> start, const Heard& heard) {
+  const Reachability reach = classify(chain);
+  double never = 0, undecided = 0;
+  for (std::size_t i = 0; i < start.size(); ++i) {
+    if (!reach.can_rest[i]) never += start[i];
+    if (reach.can_rest[i] && !reach.must_rest[i]) undecided += start[i];
+  }
+  if (undecided == 0) return never;
+  std::vector<std::uint8_t> safe(chain.size());
+  for (std::size_t i = 0; i < safe.size(); ++i) safe[i] = !reach.can_rest[i];
+  const BoundedPassage passage = bounded_passage_to(chain, safe, heard);
+  never = 0;
+  for (std::size_t i = 0; i < start.size(); ++i) never += start[i] * passage.passage.reach[i];
+  return never;
+}
+
+}  // namespace
+
+std::vector<double> bounded_survival_after(const Chain& chain, std::span<const double> start,
+                                           std::span<const double> steps,
+                                           const std::function<const QuasiStationary&()>& quasi, const Heard& heard) {
+  check_survival(chain, start, steps);
+  const auto entries = static_cast<double>(chain.entries() + chain.size());
+  const double anyhow = std::max(least_followed, std::floor(followed_anyhow / entries));
+  double last = 0;
+  for (const double n : steps)
+    if (std::isfinite(n)) last = std::max(last, std::floor(n));
+  std::unique_ptr<Settled> settled;
+  if (last > anyhow) settled = std::make_unique<Settled>(chain, quasi());
+  Survivors survivors(chain, start);
+  std::vector<double> at{survivors.survival()};
+  while (static_cast<double>(at.size()) <= last && survivors.any() &&
+         !(settled && settled->reached(survivors.shares()))) {
+    if (heard) heard();
+    if (at.size() > most_followed)
+      throw ConvergenceError("survival", std::numeric_limits<double>::quiet_NaN(),
+                             fmt::format("survivors have not settled after {} steps", most_followed));
+    survivors.step();
+    at.push_back(survivors.survival());
+  }
+  std::vector<double> told;
+  for (const double n : steps) {
+    const double whole = std::floor(n), beyond = whole - static_cast<double>(at.size() - 1);
+    if (std::isinf(n))
+      told.push_back(never(chain, start, heard));
+    else if (beyond <= 0)
+      told.push_back(at[static_cast<std::size_t>(whole)]);
+    else
+      told.push_back(survivors.any() ? static_cast<double>(std::exp(survivors.log_survival() +
+                                                                    settled->log_survival(survivors.shares(), beyond)))
+                                     : 0);
+  }
+  return told;
+}
+
+}  // namespace metastable::markov

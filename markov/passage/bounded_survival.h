@@ -1,0 +1,22 @@
+#pragma once
+// Finds the probability of surviving given numbers of steps on chains that are too large to eliminate.
+
+#include <functional>
+#include <span>
+#include <vector>
+
+#include "markov/passage/bounded_passage.h"
+
+namespace metastable::markov {
+
+/// Returns P(no rest within n steps) for each n of `steps`, as survival_after(). Survivors are followed by products.
+/// Once their shares are those of the quasi-stationary distribution, every one of them to 1e-9 (class by class of a
+/// cyclic chain), the survival goes on at the failure rate, and errs by no more than that and the rate's bounds say.
+/// @param quasi  is asked for it where steps lie beyond those that are followed in any case (1e9 products of entries)
+/// @throws as survival_after(); ConvergenceError where survivors have not settled after 20000 steps
+std::vector<double> bounded_survival_after(const Chain& chain, std::span<const double> start,
+                                           std::span<const double> steps,
+                                           const std::function<const QuasiStationary&()>& quasi,
+                                           const Heard& heard = {});
+
+}  // namespace metastable::markov

@@ -1,0 +1,127 @@
+// Chains solved by iteration, held against elimination of the same chains and against closed forms.
+
+#include "markov/passage/bounded_passage.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <random>
+
+#include "markov/passage/bounded_survival.h"
+#include "markov/passage/first_passage.h"
+#include "markov/passage/survival_after.h"
+#include "tests/markov/sparse_chains.h"
+#include "tests/message_of.h"
+
+namespace metastable::markov {
+namespace {
+
+using reference::sparse_chain;
+using reference::SparseChain;
+
+// 2900 states fill some 6e9 multiply-adds: more than GeneratorSolver eliminates, half a second for Elimination.
+constexpr std::size_t states = 2900;
+
+void expect_between(const std::vector<double>& lower, const std::vector<double>& value,
+                    const std::vector<double>& upper, double rounding) {
+  for (std::size_t i = 0; i < value.size(); ++i) {
+    ASSERT_LE(lower[i], value[i] * (1 + rounding)) << i;
+    ASSERT_GE(upper[i], value[i] * (1 - rounding)) << i;
+  }
+}
+
+class BoundedChains : public ::testing::TestWithParam<SparseChain> {};
+
+TEST_P(BoundedChains, AgreesWithEliminationWithinItsBounds) {
+  const Chain chain = sparse_chain(GetParam());
+  ASSERT_FALSE(eliminated(generator_of(chain)));
+  const BoundedSteps steps = bounded_first_passage(chain);
+  const ChainSolver solver(chain);
+  const std::vector<double> mean = mean_first_passage(solver), sd = first_passage_sd(solver, mean);
+  expect_between(steps.bounds.lower, mean, steps.bounds.upper, 1e-11);
+  for (std::size_t i = 0; i < states; ++i) ASSERT_NEAR(steps.sd[i] / sd[i], 1, 1e-8) << i;
+  EXPECT_LE(steps.bounds.upper[0] / steps.bounds.lower[0] - 1, 1e-6);
+  const BoundedQuasiStationary bounded = bounded_quasi_stationary(chain);
+  EXPECT_LE(bounded.rate_lower, bounded.quasi.failure_rate);
+  EXPECT_GE(bounded.rate_upper, bounded.quasi.failure_rate);
+  // y (I - Q) = rate y, by one elimination.
+  const std::vector<double> again = solver.solve_left(bounded.quasi.distribution);
+  for (std::size_t i = 0; i < states; ++i)
+    ASSERT_NEAR(again[i] * bounded.quasi.failure_rate, bounded.quasi.distribution[i],
+                1e-8 * bounded.quasi.distribution[i])
+        << i;
+}
+
+INSTANTIATE_TEST_SUITE_P(Kinds, BoundedChains,
+                         ::testing::Values(SparseChain{states, 1, 0, 1, 1e-6, 0},
+                                           SparseChain{states, 1, 0, 1, 1e-12, 1}, SparseChain{states, 1, 0, 1, 0.3, 0},
+                                           SparseChain{states, 7, 1e-3, 1, 1e-6, 1},
+                                           SparseChain{states, 7, 1e-9, 1, 1e-12, 0},
+                                           SparseChain{states, 1, 0, 4, 1e-6, 0}));
+
+TEST(BoundedPassageTo, AgreesWithElimination) {
+  const Chain chain = sparse_chain({states, 7, 1e-3, 1, 1e-4, 0});
+  std::vector<std::uint8_t> set(states, 0);
+  set[1] = set[17] = 1;
+  const auto bounded = bounded_passage_to(chain, set);
+  const PassageQuestion question = passage_question(chain, set);
+  const ChainSolver solver(question.inside);
+  const std::vector<double> reach = solver.solve(question.to_set), fail = solver.solve(question.kill),
+                            steps = solver.solve(std::vector<double>(states - 2, 1.0));
+  EXPECT_LE(bounded.error, 1e-6);
+  for (std::size_t n = 0; n < reach.size(); ++n) {
+    const std::uint32_t i = question.undecided[n];
+    ASSERT_NEAR(bounded.passage.reach[i] / reach[n], 1, bounded.error + 1e-11);
+    ASSERT_NEAR(bounded.passage.fail[i] / fail[n], 1, bounded.error + 1e-11);
+    ASSERT_NEAR(bounded.passage.steps[i] / steps[n], 1, bounded.error + 1e-11);
+  }
+}
+
+TEST(BoundedSurvival, AgreesWithFollowingEveryStep) {
+  for (const std::size_t period : {1U, 4U}) {
+    const Chain chain = sparse_chain({states, 1, 0, period, 1e-3, 0});
+    std::vector<double> start(states, 0);
+    start[3] = 1;
+    const std::vector<double> steps{0, 1, 7.9, 3000, 4000};
+    const QuasiStationary quasi = bounded_quasi_stationary(chain).quasi;
+    const auto ask = [&]() -> const QuasiStationary& { return quasi; };
+    const std::vector<double> all = survival_after(chain, start, steps);
+    std::vector<double> far = steps;
+    far.push_back(1e6);  // so that the survivors' settling is asked for
+    const std::vector<double> bounded = bounded_survival_after(chain, start, far, ask);
+    for (std::size_t q = 0; q < steps.size(); ++q) EXPECT_NEAR(bounded[q] / all[q], 1, 1e-8) << steps[q];
+    EXPECT_NEAR(std::log(bounded.back() / bounded[4]) / ((1e6 - 4000) * std::log1p(-quasi.failure_rate)), 1, 1e-6);
+  }
+}
+
+TEST(BoundedFirstPassage, NamesAStateThatCannotFail) {
+  // State 0 leads to itself alone.
+  Chain chain = sparse_chain({states, 1, 0, 1, 1e-3, 0});
+  std::vector<std::size_t> start{0, 0};
+  std::vector<std::uint32_t> column;
+  std::vector<double> value, kill(chain.kill().begin(), chain.kill().end());
+  kill[0] = 0;
+  for (std::size_t i = 1; i < states; ++i) {
+    column.insert(column.end(), chain.columns(i).begin(), chain.columns(i).end());
+    value.insert(value.end(), chain.values(i).begin(), chain.values(i).end());
+    start.push_back(column.size());
+  }
+  const Chain stuck(start, column, value, kill);
+  EXPECT_NE(message_of<std::domain_error>([&] { bounded_first_passage(stuck); }).find("from state 0"),
+            std::string::npos);
+  EXPECT_EQ(bounded_quasi_stationary(stuck).quasi.failure_rate, 0);
+}
+
+TEST(BoundedFirstPassage, IsHeard) {
+  const Chain chain = sparse_chain({states, 1, 0, 1, 1e-3, 0});
+  int calls = 0;
+  EXPECT_THROW(bounded_first_passage(chain,
+                                     [&] {
+                                       if (++calls == 5) throw std::runtime_error("enough");
+                                     }),
+               std::runtime_error);
+  EXPECT_EQ(calls, 5);
+}
+
+}  // namespace
+}  // namespace metastable::markov
