@@ -3,6 +3,7 @@
 #include <numeric>
 #include <utility>
 
+#include "markov/chain/elimination.h"
 #include "markov/chain/envelope.h"
 
 namespace metastable::markov {
