@@ -190,6 +190,12 @@ Estimate joined_steps(const std::vector<double>& here, const std::vector<double>
   return {weighted_quantile(weighed, 0.5), weighted_quantile(weighed, 0.05), weighted_quantile(weighed, 0.95)};
 }
 
+Estimate bounded_by_count(const Estimate& joined, const StepsBeforeFailure& counted) {
+  if (!(counted.observed_lower > 0) || !std::isfinite(counted.observed_upper)) return joined;
+  const bool narrower = joined.upper * counted.observed_lower <= counted.observed_upper * joined.lower;
+  return narrower ? joined : Estimate{counted.observed, counted.observed_lower, counted.observed_upper};
+}
+
 void add_machine_steps(Diagnosis& d, const TransitionModel& model, const WeighedFit& recalibrated,
                        const std::vector<WeighedFit>& fits, const Elsewhere& elsewhere, const DiagnosisOptions& options,
                        const std::function<void()>& heartbeat) {
@@ -206,6 +212,7 @@ void add_machine_steps(Diagnosis& d, const TransitionModel& model, const Weighed
   const ModelError error = model_error(d);
   const auto add = [&](const std::string& where, const std::vector<double>& there) {
     MachineSteps machine{where, joined_steps(of_effects, there, error, at_risk, rests), false};
+    if (where.empty()) machine.steps = bounded_by_count(machine.steps, s);
     machine.at_least = !std::isfinite(machine.steps.upper);
     // A model that never fails, and trials that did not: so many steps are seen as no failure excludes.
     if (where.empty() && !std::isfinite(machine.steps.lower)) machine.steps.lower = s.observed_lower;

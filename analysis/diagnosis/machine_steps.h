@@ -52,6 +52,11 @@ struct ModelError {
 Estimate joined_steps(const std::vector<double>& here, const std::vector<double>& there, const ModelError& error,
                       double at_risk, double rests);
 
+/// Returns the joined interval, or that of the count where it is the narrower one: a model that leaves more open than
+/// the rests do by themselves says nothing of them.
+/// @param counted  as set_observed() leaves it
+Estimate bounded_by_count(const Estimate& joined, const StepsBeforeFailure& counted);
+
 /// Fills in the intervals of the models' expected steps, and the machine's own; none where neither the models nor the
 /// count bound them.
 /// @param fits  the recalibrated model, then those of the hypotheses with their probabilities (none: that model alone)

@@ -114,5 +114,17 @@ TEST(MachineSteps, RestsRefuteAModelThatNeverFails) {
   EXPECT_NEAR(e.upper, 1000 / 5.4254, 1e-2);
 }
 
+// 25 rests in 850 collisions; a model whose draws reach from 0.7 to 142 steps says less than they do.
+TEST(MachineSteps, AreNoWiderThanTheCount) {
+  StepsBeforeFailure counted;
+  set_observed(counted, {850, 25});
+  EXPECT_EQ(bounded_by_count({6.3, 0.7, 142}, counted).value, 34);
+  EXPECT_EQ(bounded_by_count({6.3, 0.7, 142}, counted).upper, counted.observed_upper);
+  EXPECT_EQ(bounded_by_count({36, 30, 44}, counted).value, 36);
+  StepsBeforeFailure nothing;
+  set_observed(nothing, {850, 0});
+  EXPECT_EQ(bounded_by_count({6.3, 0.7, 142}, nothing).value, 6.3);
+}
+
 }  // namespace
 }  // namespace metastable::analysis

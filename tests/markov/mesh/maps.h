@@ -1,9 +1,7 @@
 #pragma once
 // Makes maps in batches whose expected steps are known from elsewhere.
 
-#include <Eigen/LU>
 #include <cmath>
-#include <numbers>
 #include <numeric>
 #include <utility>
 #include <vector>
@@ -71,23 +69,6 @@ inline BatchMap cubic_batch(double sd) {
     }
   };
   return map;
-}
-
-/// Returns the expected steps of the cubic map from x, by the midpoint rule on `nodes` of [-2, 2].
-inline double cubic_steps(double sd, double x, int nodes) {
-  const double width = 4.0 / nodes;
-  const auto density = [&](double from, double to) {
-    const double z = (to - cubic(from)) / sd;
-    return std::exp(-0.5 * z * z) / (sd * std::sqrt(2 * std::numbers::pi)) * width;
-  };
-  const Eigen::ArrayXd at = Eigen::ArrayXd::LinSpaced(nodes, -2 + width / 2, 2 - width / 2);
-  Eigen::MatrixXd left = Eigen::MatrixXd::Identity(nodes, nodes);
-  for (Eigen::Index i = 0; i < nodes; ++i)
-    for (Eigen::Index j = 0; j < nodes; ++j) left(i, j) -= density(at[i], at[j]);
-  const Eigen::VectorXd steps = left.partialPivLu().solve(Eigen::VectorXd::Ones(nodes));
-  double mean = 1;
-  for (Eigen::Index j = 0; j < nodes; ++j) mean += density(x, at[j]) * steps[j];
-  return mean;
 }
 
 /// Returns the expected steps of the linear map from x, by Gauss-Legendre quadrature of its density.

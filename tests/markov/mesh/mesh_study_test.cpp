@@ -2,8 +2,10 @@
 
 #include <gtest/gtest.h>
 
+#include <Eigen/LU>
 #include <cmath>
 #include <cstdint>
+#include <numbers>
 #include <utility>
 
 #include "markov/mesh/batch_simulation.h"
@@ -14,6 +16,23 @@ namespace metastable::markov {
 namespace {
 
 using namespace testing;  // maps.h
+
+// Returns the expected steps of the cubic map from x, by the midpoint rule on `nodes` of [-2, 2].
+double cubic_steps(double sd, double x, int nodes) {
+  const double width = 4.0 / nodes;
+  const auto density = [&](double from, double to) {
+    const double z = (to - cubic(from)) / sd;
+    return std::exp(-0.5 * z * z) / (sd * std::sqrt(2 * std::numbers::pi)) * width;
+  };
+  const Eigen::ArrayXd at = Eigen::ArrayXd::LinSpaced(nodes, -2 + width / 2, 2 - width / 2);
+  Eigen::MatrixXd left = Eigen::MatrixXd::Identity(nodes, nodes);
+  for (Eigen::Index i = 0; i < nodes; ++i)
+    for (Eigen::Index j = 0; j < nodes; ++j) left(i, j) -= density(at[i], at[j]);
+  const Eigen::VectorXd steps = left.partialPivLu().solve(Eigen::VectorXd::Ones(nodes));
+  double mean = 1;
+  for (Eigen::Index j = 0; j < nodes; ++j) mean += density(x, at[j]) * steps[j];
+  return mean;
+}
 
 MeshStudyOptions quick() { return {.seed = 2, .guided_samples = 400, .simulated_steps = 100000}; }
 
