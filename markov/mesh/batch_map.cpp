@@ -4,6 +4,8 @@
 
 #include <algorithm>
 #include <cmath>
+#include <numbers>
+#include <utility>
 
 namespace metastable::markov {
 
@@ -23,6 +25,43 @@ void require_start(const BatchMap& map, std::span<const double> start) {
   require_map(map);
   if (start.size() != static_cast<std::size_t>(map.dimension))
     throw std::invalid_argument(fmt::format("return map: a start of {} numbers expected", map.dimension));
+}
+
+BatchMap with_angles(BatchMap map, const std::vector<int>& angles, std::span<const double> around) {
+  require_start(map, around);
+  const auto dimension = static_cast<std::size_t>(map.dimension);
+  std::vector<std::pair<std::size_t, double>> turned;  // place, and the angle that its landings are near
+  for (const int place : angles) {
+    if (place < 0 || place >= map.dimension)
+      throw std::invalid_argument(fmt::format("angles: {} is outside 0..{}", place, map.dimension - 1));
+    turned.emplace_back(place, around[static_cast<std::size_t>(place)]);
+  }
+  if (turned.empty()) return map;
+  constexpr double turn = 2 * std::numbers::pi;
+  const auto seen = [turned, dimension](std::span<const double> states) {
+    std::vector<double> wrapped(states.begin(), states.end());
+    for (std::size_t row = 0; row < wrapped.size(); row += dimension)
+      for (const auto& [place, near] : turned) wrapped[row + place] = std::remainder(wrapped[row + place], turn);
+    return wrapped;
+  };
+  const auto count = [turned, dimension](std::span<double> next) {
+    for (std::size_t row = 0; row < next.size(); row += dimension)
+      for (const auto& [place, near] : turned)
+        next[row + place] = near + std::remainder(next[row + place] - near, turn);
+  };
+  if (map.step)
+    map.step = [step = map.step, seen, count](int phase, auto states, auto scores, auto next, auto failed) {
+      step(phase, seen(states), scores, next, failed);
+      count(next);
+    };
+  if (map.draw)
+    map.draw = [draw = map.draw, seen, count](int phase, auto states, auto words, auto next, auto failed) {
+      draw(phase, seen(states), words, next, failed);
+      count(next);
+    };
+  if (map.inside)
+    map.inside = [inside = map.inside, seen](int phase, auto state) { return inside(phase, seen(state)); };
+  return map;
 }
 
 std::string describe_state(const BatchMap& map, std::span<const double> state) {

@@ -69,6 +69,12 @@ void checked_step(const BatchMap& map, int phase, std::span<const double> states
 void checked_draw(const BatchMap& map, int phase, std::span<const double> states, std::span<const std::uint64_t> words,
                   std::span<double> next, std::span<std::uint8_t> failed);
 
+/// Returns the map with numbers of its state that are angles [rad]: landings are counted within pi of `around`, and the
+/// map sees them within pi of zero. So an orbit on the seam where a map wraps its angles is no jump.
+/// @param angles  places in the state, below the dimension  @param around  a state near the orbit
+/// @throws std::invalid_argument for another place
+BatchMap with_angles(BatchMap map, const std::vector<int>& angles, std::span<const double> around);
+
 /// Returns a state as words: "half angle [rad] = 0.27, ...".
 std::string describe_state(const BatchMap& map, std::span<const double> state);
 

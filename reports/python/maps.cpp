@@ -107,6 +107,7 @@ struct PythonMap {
   int dimension = 1, scores = 1, phases = 1;
   std::vector<std::string> names, noise_names;
   std::vector<double> start;
+  std::vector<int> angles;  // places in the state
 };
 
 PythonMap map_of(const py::dict& fields) {
@@ -125,6 +126,7 @@ PythonMap map_of(const py::dict& fields) {
     throw std::invalid_argument(fmt::format("noise_names: {} given, one for each of the {} numbers expected",
                                             map.noise_names.size(), map.scores));
   map.start = given.numbers("start");
+  map.angles = fields["angles"].cast<std::vector<int>>();
   return map;
 }
 
@@ -144,7 +146,7 @@ markov::BatchMap batch_of(const PythonMap& python, Call& call) {
     });
   };
   markov::require_start(map, python.start);
-  return map;
+  return markov::with_angles(std::move(map), python.angles, python.start);
 }
 
 py::dict study_map(const py::dict& fields, const py::dict& options, const std::string& command,

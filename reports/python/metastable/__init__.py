@@ -18,6 +18,7 @@ import itertools
 import json
 import math
 import numbers
+import operator
 import os
 import statistics
 from typing import Optional, Sequence, Tuple, Union
@@ -639,6 +640,7 @@ class Walker:
     noise_names: Sequence[str] = ()
     phases: int = 1
     name: str = "walker"
+    angles: Sequence = ()
 
     def __post_init__(self):
         if not callable(self.step):
@@ -646,7 +648,15 @@ class Walker:
         object.__setattr__(self, "start", _plain(numpy.atleast_1d(numpy.asarray(self.start, float))))
         object.__setattr__(self, "names", tuple(self.names))
         object.__setattr__(self, "noise_names", tuple(self.noise_names))
+        object.__setattr__(self, "angles", tuple(self._place(angle) for angle in self.angles))
         _metastable.check_map(_fields(self))
+
+    def _place(self, angle):
+        if isinstance(angle, str):
+            if angle not in self.names:
+                raise InputError(f"angles: {angle!r} is none of the names {', '.join(self.names) or '(none are given)'}")
+            return self.names.index(angle)
+        return operator.index(angle)
 
     def study(self, **options):
         """study(self, ...)."""
@@ -660,7 +670,7 @@ class Walker:
         return f"<metastable.Walker: {self.name}, {self.dimension} dimensions, {self.noise} noise>"
 
 
-def walker(step, dimension, noise, *, start, names=(), noise_names=(), phases=1, name="walker"):
+def walker(step, dimension, noise, *, start, names=(), noise_names=(), phases=1, name="walker", angles=()):
     """Any simulator as a walker: study() and simulate() then take it.
 
     step         step(state, noise) -> (next, failed), vectorised: `state` is an (n, dimension) array of states just
@@ -677,10 +687,14 @@ def walker(step, dimension, noise, *, start, names=(), noise_names=(), phases=1,
                  hang on it
     names        of the numbers of a state, with units; noise_names likewise
     phases       events after which the map repeats itself
+    angles       numbers of the state that are angles [rad], by name or place: they are counted within pi of the
+                 start's, and `step` gets them within pi of zero, so that an orbit may lie where they wrap
 
-    Raises MapError naming the state where a landing is not finite, and where the orbit fails or is unstable.
+    Beside an unstable orbit the gait may come back after several steps, up to 16: it is studied then, from a state of
+    it. Raises MapError naming the state where a landing is not finite, and where the orbit fails or is unstable and
+    leads to no such gait.
     """
-    return Walker(step, dimension, noise, start, names, noise_names, phases, name)
+    return Walker(step, dimension, noise, start, names, noise_names, phases, name, angles)
 
 
 class SimulatedSteps(Record):

@@ -2,7 +2,10 @@
 
 #include <gtest/gtest.h>
 
+#include <cmath>
 #include <limits>
+#include <numbers>
+#include <stdexcept>
 #include <vector>
 
 #include "markov/mesh/batch_simulation.h"
@@ -104,6 +107,29 @@ TEST(BatchSimulation, AgreesWithQuadratureAndNotWithThreads) {
   EXPECT_EQ(one->steps, three->steps);
   EXPECT_NEAR(one->mean, linear_steps(1.0, 2), 4 * one->standard_error);
   EXPECT_FALSE(simulate_steps(map, start, {.trials = 4000, .most_steps = 5000}));
+}
+
+// An orbit at pi, where the map wraps its angle, is that of the same map about 0.
+TEST(WithAngles, AnOrbitMayLieWhereAnglesWrap) {
+  const double pi = std::numbers::pi;
+  const auto leading = [](double around) {
+    BatchMap map;
+    map.step = [around](int, auto states, auto scores, auto next, auto failed) {
+      for (std::size_t i = 0; i < failed.size(); ++i) {
+        const double beside = std::remainder(states[i] - around, 2 * std::numbers::pi) / 2 + scores[i];
+        next[i] = std::remainder(around + beside, 2 * std::numbers::pi);
+        failed[i] = std::abs(beside) > 2.5;
+      }
+    };
+    return map;
+  };
+  const MeshStudyOptions options{.guided_samples = 0, .simulated_steps = 0};
+  const double about_zero = mesh_study(leading(0), std::vector<double>{0}, options).steps.value;
+  EXPECT_THROW(mesh_study(leading(pi), std::vector<double>{pi}, options), MapError);  // a jump on its orbit
+  const BatchMap wrapped = with_angles(leading(pi), {0}, std::vector<double>{3});
+  EXPECT_NEAR(mesh_study(wrapped, std::vector<double>{pi}, options).steps.value / about_zero, 1, 1e-3);
+  EXPECT_THROW(with_angles(leading(pi), {1}, std::vector<double>{3}), std::invalid_argument);
+  EXPECT_THROW(with_angles(leading(pi), {-1}, std::vector<double>{3}), std::invalid_argument);
 }
 
 }  // namespace

@@ -114,6 +114,21 @@ class Steps(unittest.TestCase):
                                     "where the mesh foretells .*disagree: no number is given"):
             line(band).study(simulated_steps=100000)
 
+    def test_may_have_angles_and_gaits_of_two_steps(self):
+        def turned(state, noise):  # the angles +1 and -1 about pi follow each other; it fails beyond two of them
+            beside = np.remainder(state - np.pi + np.pi, 2 * np.pi) - np.pi
+            following = 0.2 * beside ** 3 - 1.2 * beside + 0.4 * noise
+            wrapped = np.remainder(following + 2 * np.pi, 2 * np.pi) - np.pi
+            return wrapped, np.abs(following[:, 0]) > 2
+
+        walker = metastable.walker(turned, 1, 1, start=[np.pi], names=["angle [rad]"], angles=["angle [rad]"])
+        study = walker.study(simulated_steps=0, how_it_fails=True)
+        self.assertEqual(study.gait.period, 2)
+        self.assertLess(abs(study.expected_steps.value / 228.42 - 1), 0.003)  # of the same map about 0, by quadrature
+        for angles, sentence in ((["x"], "angles: 'x' is none of the names angle"), ([1], r"angles: 1 is outside 0\.\.0")):
+            with self.assertRaisesRegex(metastable.InputError, sentence):
+                metastable.walker(turned, 1, 1, start=[np.pi], names=["angle [rad]"], angles=angles)
+
     def test_of_six_dimensions_are_split(self):
         kept = np.linspace(0.3, 0.8, 6)
 
