@@ -269,7 +269,6 @@ WalkerFalls how_it_falls(const markov::BatchMap& map, std::span<const double> st
   if (noises.size() != static_cast<std::size_t>(map.scores))
     throw std::invalid_argument("how it falls: one noise for each score expected");
   const double spacing = study.sizes.at(1).spacing;
-  if (study.period > 1) start = study.orbit.frames.front().centre;
   WalkerFalls falls =
       Falls(
           markov::over_revolutions(map, study.period), start, noises,

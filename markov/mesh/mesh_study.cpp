@@ -593,14 +593,14 @@ MeshStudy mesh_study(const BatchMap& map, std::span<const double> start, const M
   try {
     return study_around(map, start, options, noise_free_orbit(map, start), 1);
   } catch (const NoOrbit& error) {
-    if (const auto gait = periodic_gait(map, start); gait && gait->period > 1) {
+    if (const auto gait = periodic_gait(map, start)) {
       const BatchMap longer = over_revolutions(map, gait->period);
       std::optional<NoiseFreeOrbit> orbit;
       try {
         orbit = noise_free_orbit(longer, gait->state);
       } catch (const NoOrbit&) {  // it does not hold walks that are pushed off it either
       }
-      if (orbit) return study_around(longer, gait->state, options, std::move(*orbit), gait->period);
+      if (orbit) return study_around(longer, start, options, std::move(*orbit), gait->period);
     }
     if (options.simulated_steps == 0) throw;
     std::string walked;

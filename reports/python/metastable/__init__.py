@@ -690,9 +690,9 @@ def walker(step, dimension, noise, *, start, names=(), noise_names=(), phases=1,
     angles       numbers of the state that are angles [rad], by name or place: they are counted within pi of the
                  start's, and `step` gets them within pi of zero, so that an orbit may lie where they wrap
 
-    Beside an unstable orbit the gait may come back after several steps, up to 16: it is studied then, from a state of
-    it. Raises MapError naming the state where a landing is not finite, and where the orbit fails or is unstable and
-    leads to no such gait.
+    Where the orbit is unstable, and without noise the map leads on to another one, which may come back after several
+    steps (up to 16), that is the gait. Raises MapError naming the state where a landing is not finite, and where the orbit fails or is unstable and
+    leads to none.
     """
     return Walker(step, dimension, noise, start, names, noise_names, phases, name, angles)
 

@@ -91,7 +91,7 @@ TEST(MeshStudy, PhasesAgreeWithSimulation) {
 TEST(MeshStudy, FollowsGaitsThatComeBackAfterTwoSteps) {
   for (const double sd : {0.4, 0.3, 0.25}) {  // 228 to 2.1e4 steps
     const MeshStudy study = mesh_study(cubic_batch(sd), std::vector<double>{0}, quick());
-    const double exact = cubic_steps(sd, 1, 400);
+    const double exact = cubic_steps(sd, 0, 400);
     EXPECT_EQ(study.period, 2);
     EXPECT_EQ(study.disagreement, "");
     EXPECT_NEAR(std::abs(study.orbit.frames[0].centre[0]), 1, 1e-9);
@@ -100,6 +100,24 @@ TEST(MeshStudy, FollowsGaitsThatComeBackAfterTwoSteps) {
     EXPECT_GE(study.steps.upper, exact * 0.9995) << sd;
     EXPECT_EQ(study.simulated.has_value(), sd == 0.4);  // by 100,000 steps
   }
+}
+
+// Beside an unstable start, 0, two gaits lie at 1 and -1: x' = 3/2 x - x^3 / 2, failed beyond -2 and 2.
+TEST(MeshStudy, FollowsGaitsBesideAnUnstableStart) {
+  BatchMap map;
+  map.step = [](int, auto states, auto scores, auto next, auto failed) {
+    for (std::size_t i = 0; i < failed.size(); ++i) {
+      next[i] = states[i] * (1.5 - 0.5 * states[i] * states[i]) + 0.35 * scores[i];
+      failed[i] = std::abs(next[i]) > 2;
+    }
+  };
+  const std::vector<double> start{0};
+  const MeshStudy study = mesh_study(map, start, quick());
+  const auto simulated = simulate_steps(map, start, {.trials = 4000, .seed = 5});
+  ASSERT_TRUE(simulated);
+  EXPECT_EQ(study.period, 1);
+  EXPECT_EQ(study.gaits.states.size(), 2U);
+  EXPECT_NEAR(study.steps.value, simulated->mean, 4 * simulated->standard_error);
 }
 
 // Logistic maps x' = r x (1 - x) have stable cycles of 2 at r = 3.2, of 4 at 3.5, of 3 at 3.83 and none at 3.9.
