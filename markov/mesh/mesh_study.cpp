@@ -198,6 +198,7 @@ class Run {
     else
       parallel_for(tasks, at_once_, [&](std::size_t task) { make(task, map_); });
     join();
+    if (walks_know_all()) study_.gait_share.clear();  // they are one gait
     over(meshes_stage);
     foresee_other_ways(study_.steps.value, study_.mixing_steps);
     if (study_.steps.upper > widest * study_.steps.lower)

@@ -131,9 +131,8 @@ Lines head_lines(const markov::MeshStudy& s) {
 Lines mesh_lines(const markov::MeshStudy& s) {
   Lines lines;
   for (std::size_t g = 1; g < s.gait_share.size(); ++g)
-    lines.emplace_back(
-        s.period > 1 ? "a gait, or this one later" : "another gait",
-        fmt::format("at {:.6g}: {:.3g} of the steps", fmt::join(s.gaits.states[g], ", "), s.gait_share[g]));
+    lines.emplace_back("another gait", fmt::format("at {:.6g}: {:.3g} of the steps", fmt::join(s.gaits.states[g], ", "),
+                                                   s.gait_share[g]));
   lines.emplace_back("relative errors", fmt::format("shifts {:.2g}, discretization {:.2g}, leaving the mesh {:.2g}",
                                                     s.shift_error, s.discretization_error, s.bracket));
   const double blind = std::max(s.blind_spots.missed, s.blind_spots.imagined);
