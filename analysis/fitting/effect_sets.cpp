@@ -17,8 +17,9 @@ namespace {
 // These numbers save time: they say which sets are fitted.
 constexpr double least_more_evidence = -4;  // promised beyond a hypothesis, for one more effect worth fitting
 constexpr double near_top = 4;              // evidence below the best, of a pair that is extended
-constexpr int most_swaps = 3;               // rounds of effects put in the place of others
-constexpr std::size_t most_extended = 3;    // pairs
+constexpr double worth_a_round = 4;  // evidence that swaps gained, for another round of them: alike effects gain less
+constexpr int most_swaps = 3;        // rounds of effects put in the place of others
+constexpr std::size_t most_extended = 3;  // pairs
 
 // Says whether the model itself tells where the last term starts beside the others.
 bool knows_start(const TransitionModel& model, const std::vector<EffectTerm>& terms) {
@@ -85,13 +86,23 @@ void add_pairs_within(const RankingProblem& problem, const SingleEffects& single
     if (pair.fitted()) pairs.push_back(std::move(pair));
 }
 
-// Returns the best hypotheses of a kind, the best one first.
-std::vector<RankedCause> strongest_of(const std::vector<RankedCause>& all, std::size_t most) {
+// Returns the best hypotheses of a kind, the best one first; of those that gain the same and differ in one effect,
+// which act alike, one stands for all.
+std::vector<RankedCause> strongest_of(const std::vector<RankedCause>& all, std::size_t most, const Rules& rules) {
   std::vector<double> evidence;
   for (const RankedCause& one : all) evidence.push_back(one.evidence);
   std::vector<RankedCause> strongest;
-  for (const std::size_t k : falling_order(evidence))
-    if (strongest.size() < most && std::isfinite(evidence[k])) strongest.push_back(all[k]);
+  for (const std::size_t k : falling_order(evidence)) {
+    if (strongest.size() == most || !std::isfinite(evidence[k])) break;
+    const bool alike = std::ranges::any_of(strongest, [&](const RankedCause& better) {
+      const auto shared = std::ranges::count_if(all[k].terms, [&](const EffectTerm& term) {
+        return std::ranges::find(better.terms, term.candidate, &EffectTerm::candidate) != better.terms.end();
+      });
+      return static_cast<std::size_t>(shared) + 1 == all[k].terms.size() &&
+             std::abs(better.gain - all[k].gain) < rules.told_apart;
+    });
+    if (!alike) strongest.push_back(all[k]);
+  }
   return strongest;
 }
 
@@ -145,6 +156,7 @@ void add_swaps(const RankingProblem& problem, const SingleEffects& singles, cons
                std::vector<RankedCause>& sets) {
   for (int round = 0; round < most_swaps; ++round) {
     const std::vector<EffectTerm> best = best_of(sets)->terms;
+    const double before = best_of(sets)->evidence;
     for (const EffectTerm& out : best) {
       std::vector<EffectTerm> rest = best;
       std::erase_if(rest, [&](const EffectTerm& one) { return one.candidate == out.candidate; });
@@ -156,7 +168,7 @@ void add_swaps(const RankingProblem& problem, const SingleEffects& singles, cons
     }
     bound_by_parts(problem, singles, pairs, sets);
     bound_by_parts(problem, singles, sets, sets);
-    if (extends(best_of(sets)->terms, best)) return;
+    if (best_of(sets)->evidence < before + worth_a_round) return;
   }
 }
 
@@ -231,7 +243,7 @@ std::vector<RankedCause> rank_larger_sets(const RankingProblem& problem, const S
   const RankedCause* pair = best_of(pairs);
   if (!pair || pair->evidence < singles.top - near_top) return sets;
   const double pair_evidence = pair->evidence;
-  std::vector<RankedCause> bases = strongest_of(pairs, most_extended);
+  std::vector<RankedCause> bases = strongest_of(pairs, most_extended, problem.rules);
   while (bases.front().terms.size() < problem.effort.most_effects) {
     const double before = bases.front().evidence;
     std::vector<RankedCause> larger;
@@ -240,7 +252,7 @@ std::vector<RankedCause> rank_larger_sets(const RankingProblem& problem, const S
       extend(problem, singles, base, std::max(before, singles.top), larger);
     }
     bound_by_parts(problem, singles, bases.front().terms.size() == 2 ? pairs : sets, larger);
-    bases = strongest_of(larger, 1);
+    bases = strongest_of(larger, 1, problem.rules);
     std::ranges::move(larger, std::back_inserter(sets));
     if (bases.empty() || bases.front().evidence < before) break;
     if (bases.front().terms.size() == 3) add_pairs_within(problem, singles, bases.front(), pairs);
