@@ -228,8 +228,9 @@ std::vector<NextExperiment> next_experiments(const TransitionModel& model, const
         if (!one.changes.empty())
           if (NextExperiment& best = alone[one.changes[0].first]; one.separation >= best.separation) best = one;
     const auto best = std::ranges::max_element(weighed, {}, &NextExperiment::separation);
+    const double to_beat = base.changes.empty() ? weighed.front().separation : base.separation;
     designs.clear();
-    if (!best->changes.empty() && best->separation > worth_a_change * base.separation) {
+    if (!best->changes.empty() && best->separation > worth_a_change * to_beat) {
       base = *best;
       changed = made[static_cast<std::size_t>(best - weighed.begin())];
       for (ChangedExperiment& one : changed->alternatives(cause.nuisance, issue.shared, seed)) {

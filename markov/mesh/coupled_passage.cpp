@@ -199,7 +199,7 @@ CoupledPassage coupled_passage(const Mesh& mesh, std::span<const double> start, 
   double last = 0, change = 0;
   for (int still = 0; still < still_rounds;) {
     if (passage.products >= product_limit)
-      throw ConvergenceError("mesh", change, "visits still change after 20000 products");
+      throw ConvergenceError("mesh", change, "visits of its gaits still change after 20000 products");
     for (int k = 0; k < smoothing; ++k) smooth(mesh, b, y, led);
     passage.products += smoothing;
     aggregation.read(y);

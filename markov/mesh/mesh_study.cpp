@@ -571,6 +571,10 @@ MeshStudy study_around(const BatchMap& map, std::span<const double> start, const
     const std::string text = fmt::format("{}; {}", error.what(), found);
     if (fails) throw Disagreement(text + ": no number is given");
     throw NoFailureFound(text);
+  } catch (const ConvergenceError& error) {
+    if (options.simulated_steps == 0) throw;
+    throw Disagreement(
+        fmt::format("{}; {}: no number is given", error.what(), walked_alone(map, start, options).first));
   }
 }
 

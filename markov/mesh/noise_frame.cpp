@@ -19,6 +19,7 @@ using Eigen::VectorXd;
 
 constexpr int revolution_limit = 5000;
 constexpr double orbit_tolerance = 1e-11;
+constexpr double same_state = 1e-7;         // of states that are still led to it
 constexpr double period_tolerance = 1e-11;  // of a state that has come back
 constexpr int least_revolutions =
     300;                            // before a gait counts as reached: a way away from an unstable one begins slowly
@@ -152,6 +153,18 @@ std::vector<double> row_major(const MatrixXd& m) {
 
 }  // namespace
 
+namespace {
+
+// Returns after how many revolutions a state has come back, 0 for none.
+int first_return(const std::deque<VectorXd>& before, const VectorXd& state, double tolerance) {
+  for (std::size_t period = 1; period <= before.size(); ++period)
+    if ((state - before[period - 1]).cwiseAbs().maxCoeff() <= tolerance * (1 + state.cwiseAbs().maxCoeff()))
+      return static_cast<int>(period);
+  return 0;
+}
+
+}  // namespace
+
 std::optional<PeriodicGait> periodic_gait(const BatchMap& map, std::span<const double> start) {
   const Probe probe(map);
   const VectorXd quiet = VectorXd::Zero(map.scores);
@@ -163,10 +176,10 @@ std::optional<PeriodicGait> periodic_gait(const BatchMap& map, std::span<const d
       before.push_front(state);
       if (before.size() > static_cast<std::size_t>(longest_period)) before.pop_back();
       for (int phase = 0; phase < map.phases; ++phase) state = probe(phase, state, quiet, "without noise it fails");
-      const double near = period_tolerance * (1 + state.cwiseAbs().maxCoeff());
-      for (std::size_t period = 1; period <= before.size(); ++period)
-        if ((state - before[period - 1]).cwiseAbs().maxCoeff() <= near && revolution > least_revolutions)
-          return PeriodicGait{static_cast<int>(period), {state.begin(), state.end()}};
+      if (revolution <= least_revolutions) continue;
+      // On a way that alternates about the gait twice the period is near first: the shortest one that is near as well.
+      if (const auto found = first_return(before, state, period_tolerance); found > 0)
+        return PeriodicGait{first_return(before, state, same_state), {state.begin(), state.end()}};
     }
   } catch (const MapError&) {  // it ends there: there is no gait to find
   }

@@ -129,7 +129,7 @@ TEST(PeriodicGait, FindsThePeriodsOfLogisticMaps) {
     };
     return map;
   };
-  for (const auto& [r, period] : {std::pair{2.5, 1}, {3.2, 2}, {3.5, 4}, {3.83, 3}, {3.9, 0}}) {
+  for (const auto& [r, period] : {std::pair{2.5, 1}, {3.2, 2}, {3.44, 2}, {3.445, 2}, {3.5, 4}, {3.83, 3}, {3.9, 0}}) {
     const auto gait = periodic_gait(logistic(r), std::vector<double>{1 - 1 / r});
     EXPECT_EQ(gait ? gait->period : 0, period) << r;
   }
