@@ -400,6 +400,19 @@ bool springs(const WheelRuns& measured, const RunCollision& m) {
   return !measured.springing.empty() && measured.springing[static_cast<std::size_t>(m.context.leg)];
 }
 
+void note_missing(WheelRuns& measured, const Columns& columns) {
+  if (columns.time == Presence::none)
+    measured.notes.push_back(
+        "time_s is missing: times between collisions are those of the model's stance; ramp_vibration rests on them");
+  if (columns.position == Presence::none)
+    measured.notes.push_back(
+        "position_m is missing: positions follow from the legs' lengths; slope_profile and friction_patch rest on "
+        "them");
+  if (!measured.speeds_after)
+    measured.notes.push_back("omega_plus_rad_s is missing: collision and stance cannot be told apart");
+  if (!columns.outcomes) measured.notes.push_back("trials.csv is missing: whether trials came to rest is not known");
+}
+
 // Finds legs with more restitution than speeds at which feet stand are taken for: hardly a landing of theirs has less,
 // where many of the other legs' have. Feet that slide hide what they have, so that a leg with too little friction to
 // stick is taken for one, which leaves out what follows its slides.
@@ -547,17 +560,7 @@ WheelRuns wheel_runs(const Experiment& experiment) {
   else
     blur_digits(measured, experiment.sensor.last_digit.value_or(0) / std::sqrt(12.0));
   for (WheelRun& run : measured.runs) mark_jam(measured, run);
-  if (experiment.columns.time == Presence::none)
-    measured.notes.push_back(
-        "time_s is missing: times between collisions are those of the model's stance; ramp_vibration rests on them");
-  if (experiment.columns.position == Presence::none)
-    measured.notes.push_back(
-        "position_m is missing: positions follow from the legs' lengths; slope_profile and friction_patch rest on "
-        "them");
-  if (!measured.speeds_after)
-    measured.notes.push_back("omega_plus_rad_s is missing: collision and stance cannot be told apart");
-  if (!experiment.columns.outcomes)
-    measured.notes.push_back("trials.csv is missing: whether trials came to rest is not known");
+  note_missing(measured, experiment.columns);
   return measured;
 }
 
