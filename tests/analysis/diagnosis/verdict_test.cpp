@@ -174,5 +174,33 @@ TEST(Verdict, PairsAreAlikeWhereWhatTheyDoNotShareIs) {
       "here beside trial_drift (inertia, slope_offset), trial_drift+bounce.");
 }
 
+// An interval that reaches further up than down stays so, alone and averaged over hypotheses that say the same; where
+// they differ, their mean is between them and its interval holds both.
+TEST(AtWork, IntervalsAreAsWideOnEitherSideAsTheirHypothesesSay) {
+  const auto cause = [](std::vector<std::string> effects, double probability, double value) {
+    Cause one;
+    one.effects = std::move(effects);
+    one.probability = probability;
+    one.parameters.resize(one.effects.size());
+    one.parameters[0] = {{"friction_ratio", value, value - 0.1, value + 0.4}};
+    return one;
+  };
+  const auto said = [](const std::vector<Cause>& causes) {
+    return judged(causes, {0, 0, 0}, a_gap, enough_data()).causes.at_work.at(0).parameters.at(0);
+  };
+  for (const EstimatedParameter& same :
+       {said({cause({"friction_patch"}, 0.98, 1.3)}),
+        said({cause({"friction_patch"}, 0.7, 1.3), cause({"friction_patch", "bounce"}, 0.28, 1.3)})}) {
+    EXPECT_NEAR(same.value, 1.3, 1e-12);
+    EXPECT_NEAR(same.lower, 1.2, 1e-9);
+    EXPECT_NEAR(same.upper, 1.7, 1e-9);
+  }
+  const EstimatedParameter apart =
+      said({cause({"friction_patch"}, 0.49, 1.3), cause({"friction_patch", "bounce"}, 0.49, 2.3)});
+  EXPECT_NEAR(apart.value, 1.8, 1e-12);
+  EXPECT_LT(apart.lower, 1.2);
+  EXPECT_GT(apart.upper, 2.5);
+}
+
 }  // namespace
 }  // namespace metastable::analysis
