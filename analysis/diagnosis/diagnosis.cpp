@@ -397,12 +397,11 @@ Decided decide(const TransitionModel& model, const Fitted& fitted, const std::ve
   return decided;
 }
 
-// Doubts effects that close no more, as the last, than what stays without a name: what takes that shape may take theirs.
+// Doubts effects that are lesser than what stays without a name.
 void doubt_lesser_effects(Diagnosis& d) {
-  std::map<std::string, double> doubted;
-  for (const AtWork& one : d.causes.at_work)
-    if (one.closes_beside && one.closes_beside->value <= 1 - *d.shrinkage.measures.front().closed)
-      for (const std::string& effect : one.effects) doubted[effect] = 1 / (1 + Rules::even_odds);
+  const std::optional<double> closed_upper = d.shrinkage.measures.front().closed_upper;
+  if (!closed_upper) return;
+  const std::map<std::string, double> doubted = lesser_effects(d.causes.at_work, 1 - *closed_upper);
   if (doubted.empty()) return;
   Named named = corrected({d.verdict, d.causes.set, d.causes.alike, d.causes.at_work, d.causes.p_unnamed}, doubted,
                           d.causes.p_unnamed, d.causes.ranked, d.rules);

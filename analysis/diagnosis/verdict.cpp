@@ -270,6 +270,14 @@ Named give_verdict(const Probabilities& probabilities, const Odds& unnamed, cons
   return named;
 }
 
+std::map<std::string, double> lesser_effects(const std::vector<AtWork>& at_work, double left_lower) {
+  std::map<std::string, double> lesser;
+  for (const AtWork& one : at_work)
+    if (one.closes_beside && one.closes_beside->upper < left_lower)
+      for (const std::string& effect : one.effects) lesser[effect] = 1 / (1 + Rules::even_odds);
+  return lesser;
+}
+
 Named corrected(Named named, const std::map<std::string, double>& beside, double unnamed,
                 const std::vector<Cause>& ranked, const Rules& rules) {
   const auto is_there = [&](const AtWork& one) { return one.probability >= rules.least_at_work; };

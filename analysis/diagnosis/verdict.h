@@ -96,6 +96,11 @@ Named give_verdict(const Probabilities& probabilities, const Odds& unnamed, cons
                    const std::vector<Detectability>& visible, const Diagnosis::Data& data,
                    const std::string& recalibration_id, const Rules& rules);
 
+/// Lists effects that, added last, clearly close less than what stays without a name, with even odds of being at work:
+/// what takes that shape may take theirs as well.
+/// @param left_lower  lower end of the share of the gap that stays
+std::map<std::string, double> lesser_effects(const std::vector<AtWork>& at_work, double left_lower);
+
 /// Corrects the probabilities of a partly explained gap by what each effect gains beside the unnamed: an effect that
 /// only takes its shape is not at work, and where none is left the gap is unexplained.
 /// @param beside  probabilities_beside_unnamed(); effects that it lacks stay as they are

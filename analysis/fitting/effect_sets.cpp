@@ -21,6 +21,8 @@ constexpr double worth_a_round = 4;  // evidence that swaps gained, for another 
 constexpr int most_swaps = 3;        // rounds of effects put in the place of others
 constexpr std::size_t most_extended = 3;  // pairs
 
+constexpr double hardly_more = 9;  // by a set beyond one of its parts: less, and the part bounds it in any case
+
 // Says whether the model itself tells where the last term starts beside the others.
 bool knows_start(const TransitionModel& model, const std::vector<EffectTerm>& terms) {
   const std::vector<FitStart> starts = model.starts(terms);
@@ -270,6 +272,8 @@ void bound_by_parts(const RankingProblem& problem, const SingleEffects& singles,
       std::erase_if(others, [&](const EffectTerm& one) { return one.candidate == last.candidate; });
       const auto part = find_set(parts, others);
       if (part == parts.end() || !part->fitted() || !std::isfinite(part->evidence)) continue;
+      // Beside an exact effect the others have no error of form to be forgiven: it comes first.
+      if (last.candidate->exact && set.gain > part->gain + hardly_more) continue;
       const double beyond = earned(problem.model, set.fit, part->fit,
                                    exact_part(singles.causes, part->terms, problem.recalibrated), problem.rules);
       set.evidence =

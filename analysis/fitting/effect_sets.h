@@ -45,8 +45,8 @@ std::vector<RankedCause> rank_larger_sets(const RankingProblem& problem, const S
                                           std::vector<RankedCause>& pairs);
 
 /// Bounds the evidence of sets by what each effect, taken as the last one, earns beyond the same without it: the order
-/// that says least decides, whichever came first in the search. A set that gains nothing beyond a part of it is that
-/// part.
+/// that says least decides, whichever came first in the search, but effects that are exact come first. A set that gains
+/// nothing beyond a part of it is that part.
 /// @param parts  hypotheses of one effect less among them; may be `sets`
 void bound_by_parts(const RankingProblem& problem, const SingleEffects& singles, const std::vector<RankedCause>& parts,
                     std::vector<RankedCause>& sets);

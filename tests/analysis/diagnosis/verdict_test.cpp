@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <map>
 #include <string>
 #include <tuple>
 #include <vector>
@@ -200,6 +201,19 @@ TEST(AtWork, IntervalsAreAsWideOnEitherSideAsTheirHypothesesSay) {
   EXPECT_NEAR(apart.value, 1.8, 1e-12);
   EXPECT_LT(apart.lower, 1.2);
   EXPECT_GT(apart.upper, 2.5);
+}
+
+// What stays is 12 % of the gap at least: an effect that closes 1 to 3 % beside the others is doubted, one of 7 to 17 %
+// is not.
+TEST(LesserEffects, CloseClearlyLessThanWhatStays) {
+  AtWork small, large, unknown;
+  small.effects = {"slope_profile", "hub_eccentricity"};
+  small.closes_beside = Estimate{0.02, 0.01, 0.03};
+  large.effects = {"leg_contact"};
+  large.closes_beside = Estimate{0.12, 0.07, 0.17};
+  unknown.effects = {"bounce"};
+  const std::map<std::string, double> doubted = lesser_effects({small, large, unknown}, 0.12);
+  EXPECT_EQ(doubted, (std::map<std::string, double>{{"slope_profile", 0.5}, {"hub_eccentricity", 0.5}}));
 }
 
 }  // namespace
