@@ -16,7 +16,7 @@ namespace {
 
 constexpr double followed_anyhow = 1e9;  // entries times steps
 constexpr double least_followed = 256;   // steps
-constexpr std::size_t most_followed = 20000;
+constexpr double most_followed = 20000;  // steps of survivors that do not settle, where no more are followed anyhow
 constexpr double settled_share = 1e-9;  // of every state, relative
 
 /// Survivors of a chain, step by step.
@@ -118,6 +118,7 @@ std::vector<double> bounded_survival_after(const Chain& chain, std::span<const d
   check_survival(chain, start, steps);
   const auto entries = static_cast<double>(chain.entries() + chain.size());
   const double anyhow = std::max(least_followed, std::floor(followed_anyhow / entries));
+  const double most = std::max(most_followed, anyhow);
   double last = 0;
   for (const double n : steps)
     if (std::isfinite(n)) last = std::max(last, std::floor(n));
@@ -128,9 +129,9 @@ std::vector<double> bounded_survival_after(const Chain& chain, std::span<const d
   while (static_cast<double>(at.size()) <= last && survivors.any() &&
          !(settled && settled->reached(survivors.shares()))) {
     if (heard) heard();
-    if (at.size() > most_followed)
+    if (static_cast<double>(at.size()) > most)
       throw ConvergenceError("survival", std::numeric_limits<double>::quiet_NaN(),
-                             fmt::format("survivors have not settled after {} steps", most_followed));
+                             fmt::format("survivors have not settled after {} steps", most));
     survivors.step();
     at.push_back(survivors.survival());
   }

@@ -13,7 +13,8 @@ namespace metastable::markov {
 /// Once their shares are those of the quasi-stationary distribution, every one of them to 1e-9 (class by class of a
 /// cyclic chain), the survival goes on at the failure rate, and errs by no more than that and the rate's bounds say.
 /// @param quasi  is asked for it where steps lie beyond those that are followed in any case (1e9 products of entries)
-/// @throws as survival_after(); ConvergenceError where survivors have not settled after 20000 steps
+/// @throws as survival_after(); ConvergenceError where survivors have not settled after 20000 steps,
+/// nor after those that are followed in any case
 std::vector<double> bounded_survival_after(const Chain& chain, std::span<const double> start,
                                            std::span<const double> steps,
                                            const std::function<const QuasiStationary&()>& quasi,

@@ -94,6 +94,13 @@ TEST(BoundedSurvival, AgreesWithFollowingEveryStep) {
   }
 }
 
+TEST(BoundedSurvival, FollowsAllStepsThatAreFollowedInAnyCase) {
+  const Chain one({0, 0}, {}, {}, {1e-4});
+  const auto never = []() -> const QuasiStationary& { throw std::logic_error("asked for what survivors look like"); };
+  const double survival = bounded_survival_after(one, std::vector<double>{1}, std::vector<double>{22000}, never)[0];
+  EXPECT_NEAR(survival / std::exp(22000 * std::log1p(-1e-4)), 1, 1e-12);
+}
+
 TEST(BoundedFirstPassage, NamesAStateThatCannotFail) {
   // State 0 leads to itself alone.
   Chain chain = sparse_chain({states, 1, 0, 1, 1e-3, 0});
