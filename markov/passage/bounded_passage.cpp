@@ -18,6 +18,7 @@ constexpr double outwards = 4 * std::numeric_limits<double>::epsilon();  // a bo
 constexpr double narrow = 1e-9;                                          // bounds that are not refined
 constexpr double enough = 1e-12;    // width of the bounds of a rate that need not be narrower
 constexpr int most_sweeps = 300;    // of a probability
+constexpr int most_refined = 4;     // corrections of a variance; each leaves a thousandth where a group is hardly left
 constexpr Extended swept = 1e-17L;  // residual, of what leaves the state
 
 /// v_i - sum q_ij v_j as a sum of products, and what its rounding may be.
@@ -64,8 +65,6 @@ SplitVector refined(const Chain& chain, GeneratorSolver& solver, std::span<const
   for (std::size_t i = 0; i < left.size(); ++i) better.rest[i] += correction[i];
   return better;
 }
-
-double width(const VectorBounds& bounds) { return bounds.upper[0] / bounds.lower[0] - 1; }
 
 /// What first_passage_sd() solves for, from split means, in units of the largest one.
 Row variance_of_a_step(const Chain& chain, const SplitVector& mean, Extended unit) {
@@ -144,17 +143,73 @@ Decided decided(const Chain& inside, GeneratorSolver& solver, const std::vector<
   return decided;
 }
 
-/// Solves for the expected steps, as narrowly as it takes, and bounds them.
-VectorBounds expected_steps(const Chain& chain, GeneratorSolver& solver, SplitVector& mean) {
-  const Row ones(chain.size(), 1);
-  mean = solver.solve_split(ones);
-  VectorBounds bounds = steps_enclosed(chain, mean);
-  if (!(width(bounds) <= narrow)) {
-    mean = refined(chain, solver, ones, mean);
+/// Holds expected steps and their bounds.
+struct Steps {
+  SplitVector mean;
+  VectorBounds bounds;
+  double error() const { return error_within(bounds, mean); }
+  void refine(const Chain& chain, GeneratorSolver& solver) {
+    mean = refined(chain, solver, Row(chain.size(), 1), mean);
     bounds = steps_enclosed(chain, mean);
   }
-  if (!(width(bounds) <= widest_bound)) refuse("expected steps", width(bounds));
-  return bounds;
+};
+
+/// Solves for the expected steps, as narrowly as it takes, and bounds them.
+Steps expected_steps(const Chain& chain, GeneratorSolver& solver) {
+  Steps steps{solver.solve_split(Row(chain.size(), 1)), {}};
+  steps.bounds = steps_enclosed(chain, steps.mean);
+  if (!(steps.error() <= narrow)) steps.refine(chain, solver);
+  if (!(steps.error() <= widest_bound)) refuse("expected steps", steps.error());
+  return steps;
+}
+
+/// Bounds the error of standard deviations, relative to them or, where they are less, to one step.
+///
+/// With m the means found, at most w off, g the variance that a step adds by them, v the variance found, and what
+/// (I - Q) v leaves of g at most b (2 m - 1 + g), the second moment v + m^2, whose right side is 2 m - 1, is at most
+/// 6 w + 3 b off, because the solution for g is no more than the second moment, and v at most 8 w + 3 b of that.
+/// @param unit  of the means; the variances are in its square
+double sd_error(const Chain& chain, const Steps& steps, Extended unit, const Row& of_a_step,
+                const SplitVector& variance) {
+  Extended beside = 0;  // b
+  for (std::size_t i = 0; i < chain.size(); ++i) {
+    const Difference one = difference(chain, i, variance);
+    const auto terms = static_cast<Extended>(chain.columns(i).size() + 3);
+    const Extended off = std::abs(of_a_step[i] - one.value) + one.error + 4 * terms * extended_rounding * of_a_step[i];
+    if (!std::isfinite(off)) return std::numeric_limits<double>::infinity();
+    const Extended against = (2 * std::max<Extended>(1, steps.bounds.lower[i]) - 1) / unit / unit + of_a_step[i];
+    beside = std::max(beside, off / against);
+  }
+  const Extended share = 8 * static_cast<Extended>(steps.error()) + 3 * beside;
+  if (!(share < 0.5L)) return std::numeric_limits<double>::infinity();
+  Extended most = 0;
+  for (std::size_t i = 0; i < chain.size(); ++i) {
+    const Extended found = unit * unit * std::max<Extended>(0, variance.sum(i));
+    const Extended off = share / (1 - share) * (found + steps.mean.sum(i) * steps.mean.sum(i));
+    const Extended of_sd = found > off ? off / std::sqrt(found) : std::sqrt(off);
+    most = std::max(most, of_sd / std::max<Extended>(1, std::sqrt(found)));
+  }
+  return static_cast<double>(most);
+}
+
+/// Solves for the standard deviations, and refines means and variances as often as that takes.
+std::vector<double> standard_deviations(const Chain& chain, GeneratorSolver& solver, Steps& steps) {
+  Extended unit = 0;
+  for (std::size_t i = 0; i < chain.size(); ++i) unit = std::max(unit, steps.mean.sum(i));
+  Row of_a_step = variance_of_a_step(chain, steps.mean, unit);
+  SplitVector variance = solver.solve_split(of_a_step);
+  double error = sd_error(chain, steps, unit, of_a_step, variance);
+  for (int again = 0; again < most_refined && !(error <= widest_bound); ++again) {
+    steps.refine(chain, solver);
+    of_a_step = variance_of_a_step(chain, steps.mean, unit);
+    variance = refined(chain, solver, of_a_step, variance);
+    error = sd_error(chain, steps, unit, of_a_step, variance);
+  }
+  if (!(error <= widest_bound)) refuse("standard deviations of the steps", error);
+  std::vector<double> sd;
+  for (std::size_t i = 0; i < chain.size(); ++i)
+    sd.push_back(static_cast<double>(unit * std::sqrt(std::max<Extended>(0, variance.sum(i)))));
+  return sd;
 }
 
 }  // namespace
@@ -175,6 +230,11 @@ VectorBounds steps_enclosed(const Chain& chain, const SplitVector& v) {
   return bounds;
 }
 
+double error_within(const VectorBounds& bounds, const SplitVector& v) {
+  const auto first = static_cast<double>(v.sum(0));
+  return std::max(bounds.upper[0] / first - 1, 1 - bounds.lower[0] / first);
+}
+
 BoundedSteps bounded_first_passage(const Chain& chain, const Heard& heard) {
   const std::vector<std::uint8_t> can_rest = classify(chain).can_rest;
   const auto stuck = std::find(can_rest.begin(), can_rest.end(), 0);
@@ -182,17 +242,12 @@ BoundedSteps bounded_first_passage(const Chain& chain, const Heard& heard) {
     throw std::domain_error(
         fmt::format("chain solver: rest cannot be reached from state {}", stuck - can_rest.begin()));
   GeneratorSolver solver(generator_of(chain), heard);
-  SplitVector mean;
+  Steps found = expected_steps(chain, solver);
   BoundedSteps steps;
-  steps.bounds = expected_steps(chain, solver, mean);
-  Extended unit = 0;
-  for (std::size_t i = 0; i < chain.size(); ++i) {
-    steps.mean.push_back(std::max(1.0, static_cast<double>(mean.sum(i))));
-    unit = std::max(unit, mean.sum(i));
-  }
-  const Row variance = solver.solve(variance_of_a_step(chain, mean, unit));
-  for (const Extended one : variance)
-    steps.sd.push_back(static_cast<double>(unit * std::sqrt(std::max<Extended>(0, one))));
+  steps.sd = standard_deviations(chain, solver, found);
+  steps.bounds = std::move(found.bounds);
+  for (std::size_t i = 0; i < chain.size(); ++i)
+    steps.mean.push_back(std::max(1.0, static_cast<double>(found.mean.sum(i))));
   return steps;
 }
 
@@ -231,8 +286,11 @@ BoundedQuasiStationary bounded_quasi_stationary(const Chain& chain, const Heard&
     if (bounded.rate_upper > (1 + narrow) * bounded.rate_lower)
       enclose_rate(chain, refined(chain, solver, pair.right, weight), bounded);
   }
-  if (!(bounded.rate_upper <= (1 + widest_bound) * bounded.rate_lower))
-    refuse("failure rate", bounded.rate_upper / bounded.rate_lower - 1);
+  double& rate = bounded.quasi.failure_rate;
+  const double error =
+      std::max({bounded.rate_upper / bounded.rate_lower, bounded.rate_upper / rate, rate / bounded.rate_lower}) - 1;
+  if (!(error <= widest_bound)) refuse("failure rate", error);
+  rate = std::max(bounded.rate_lower, std::min(bounded.rate_upper, rate));
   return bounded;
 }
 
@@ -241,14 +299,13 @@ BoundedPassage bounded_passage_to(const Chain& chain, std::span<const std::uint8
   if (question.undecided.empty()) return {question.passage, 0};
   const Chain& inside = question.inside;
   GeneratorSolver solver(generator_of(inside), heard);
-  SplitVector steps;
-  const VectorBounds bounds = expected_steps(inside, solver, steps);
+  const Steps steps = expected_steps(inside, solver);
   const Decided reach = decided(inside, solver, question.to_set, heard),
                 fail = decided(inside, solver, question.kill, heard);
   std::vector<double> expected;
-  for (std::size_t i = 0; i < inside.size(); ++i) expected.push_back(static_cast<double>(steps.sum(i)));
+  for (std::size_t i = 0; i < inside.size(); ++i) expected.push_back(static_cast<double>(steps.mean.sum(i)));
   question.answer(reach.probability, fail.probability, expected);
-  return {question.passage, std::max({reach.error, fail.error, bounds.upper[0] / bounds.lower[0] - 1})};
+  return {question.passage, std::max({reach.error, fail.error, steps.error()})};
 }
 
 }  // namespace metastable::markov

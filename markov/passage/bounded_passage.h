@@ -26,14 +26,19 @@ struct VectorBounds {
 /// @param v  > 0
 VectorBounds steps_enclosed(const Chain& chain, const SplitVector& v);
 
+/// Returns how far v may be off by bounds that steps_enclosed() found from it, relative; the same for all entries. v
+/// need not lie between them.
+double error_within(const VectorBounds& bounds, const SplitVector& v);
+
 struct BoundedSteps {
   std::vector<double> mean, sd;  ///< from each state [steps]
   VectorBounds bounds;           ///< of the mean
 };
 /// Finds mean and sd of the steps to rest from every state, as mean_first_passage() and first_passage_sd(), by
-/// GeneratorSolver.
-/// @throws std::domain_error naming a state from which rest cannot be reached; ConvergenceError where bounds are wider
-/// than widest_bound
+/// GeneratorSolver. The sd is proven by its residual: to widest_bound of itself or, where it is less than a step, of a
+/// step.
+/// @throws std::domain_error naming a state from which rest cannot be reached; ConvergenceError where mean or sd are
+/// not proven to widest_bound
 BoundedSteps bounded_first_passage(const Chain& chain, const Heard& heard = {});
 
 /// Returns v as it is, its rest zero.
@@ -44,8 +49,11 @@ struct BoundedQuasiStationary {
   double rate_lower = 0,
          rate_upper = 1;  ///< of the failure rate: min and max of (w - Q w) / w, w > 0 (Collatz, Wielandt)
 };
-/// Bounds the failure rate by a vector: (w - Q w) / w on the states where w > 0, which others must not lead to. Bounds
-/// that are there already stay where they are narrower.
+/// Bounds the failure rate by a vector: (w - Q w) / w on the states where w > 0. Bounds that are there already stay
+/// where they are narrower.
+///
+/// Of a reducible chain w is 0 on states that do not lead to those where it is above 0. What is proven then is the rate
+/// on the others: that of the class that was found to fade slowest, and not that no other class fades more slowly.
 void enclose_rate(const Chain& chain, const SplitVector& weight, BoundedQuasiStationary& bounded);
 
 /// Finds the quasi-stationary distribution of any chain by leading_pair(), cyclic chains as a whole.

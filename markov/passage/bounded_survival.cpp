@@ -17,7 +17,7 @@ namespace {
 constexpr double followed_anyhow = 1e9;  // entries times steps
 constexpr double least_followed = 256;   // steps
 constexpr double most_followed = 20000;  // steps of survivors that do not settle, where no more are followed anyhow
-constexpr double settled_share = 1e-9;  // of every state, relative
+constexpr double settled_share = 1e-9;   // of every state, relative
 
 /// Survivors of a chain, step by step.
 class Survivors {

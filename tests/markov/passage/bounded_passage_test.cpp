@@ -5,7 +5,10 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <cstdint>
+#include <map>
 #include <random>
+#include <vector>
 
 #include "markov/passage/bounded_survival.h"
 #include "markov/passage/first_passage.h"
@@ -28,6 +31,28 @@ void expect_between(const std::vector<double>& lower, const std::vector<double>&
     ASSERT_LE(lower[i], value[i] * (1 + rounding)) << i;
     ASSERT_GE(upper[i], value[i] * (1 - rounding)) << i;
   }
+}
+
+/// Two blocks, the states of each linked at random, that every state leaves with the same probability.
+Chain blocks_apart(std::size_t block, double leave, double kill_first, double kill_second) {
+  std::mt19937_64 engine(3);
+  std::vector<std::size_t> start{0};
+  std::vector<std::uint32_t> column;
+  std::vector<double> value, kill;
+  for (std::size_t i = 0; i < 2 * block; ++i) {
+    const std::size_t own = i < block ? 0 : block;
+    std::map<std::uint32_t, double> row;
+    for (int k = 0; k < 9; ++k) row[static_cast<std::uint32_t>(own + engine() % block)] += 0.08;
+    row.erase(static_cast<std::uint32_t>(i));
+    row[static_cast<std::uint32_t>(block - own + engine() % block)] = leave;
+    for (const auto& [to, probability] : row) {
+      column.push_back(to);
+      value.push_back(probability);
+    }
+    start.push_back(column.size());
+    kill.push_back(own == 0 ? kill_first : kill_second);
+  }
+  return Chain(start, column, value, kill);
 }
 
 class BoundedChains : public ::testing::TestWithParam<SparseChain> {};
@@ -58,6 +83,35 @@ INSTANTIATE_TEST_SUITE_P(Kinds, BoundedChains,
                                            SparseChain{states, 7, 1e-3, 1, 1e-6, 1},
                                            SparseChain{states, 7, 1e-9, 1, 1e-12, 0},
                                            SparseChain{states, 1, 0, 4, 1e-6, 0}));
+
+// Blocks that every state leaves with the same probability to the next one, and fails from with the same one, so that
+// mean and variance are those of a chain of two states.
+TEST(BoundedFirstPassage, ProvesTheSdOfBlocksThatAreHardlyLeft) {
+  const Extended leave = 1e-17L, rare = 1e-17L, often = 1e-3L;
+  const std::size_t block = 1900;
+  const Chain chain =
+      blocks_apart(block, static_cast<double>(leave), static_cast<double>(rare), static_cast<double>(often));
+  // (I - Q) m = 1 and (I - Q) v = g by Cramer's rule; the determinant is a sum.
+  const Extended determinant = leave * rare + leave * often + rare * often;
+  const Extended mean_rare = (often + 2 * leave) / determinant, mean_often = (rare + 2 * leave) / determinant;
+  const auto square = [](Extended off) { return off * off; };
+  const Extended apart = (often - rare) / determinant;
+  const Extended g_rare = rare * square(mean_rare - 1) + leave * square(1 - apart) + 1 - leave - rare,
+                 g_often = often * square(mean_often - 1) + leave * square(1 + apart) + 1 - leave - often;
+  const Extended sd_rare = std::sqrt(((often + leave) * g_rare + leave * g_often) / determinant),
+                 sd_often = std::sqrt((leave * g_rare + (rare + leave) * g_often) / determinant);
+  const BoundedSteps steps = bounded_first_passage(chain);
+  for (std::size_t i = 0; i < 2 * block; ++i)
+    ASSERT_NEAR(steps.sd[i] / static_cast<double>(i < block ? sd_rare : sd_often), 1, 1e-6) << i;
+}
+
+TEST(StepsEnclosed, TellsHowFarAVectorBesideItsBoundsIsOff) {
+  const Chain one({0, 0}, {}, {}, {0.25});
+  for (const double found : {4.0, 8.0, 2.0}) {
+    const SplitVector v = split(std::vector<double>{found});
+    EXPECT_NEAR(error_within(steps_enclosed(one, v), v), std::abs(4 / found - 1), 1e-14) << found;
+  }
+}
 
 TEST(BoundedPassageTo, AgreesWithElimination) {
   const Chain chain = sparse_chain({states, 7, 1e-3, 1, 1e-4, 0});
