@@ -7,6 +7,11 @@
 #include "markov/chain/elimination.h"
 
 namespace metastable::markov {
+namespace {
+
+constexpr double heard_every = 1e7;  // multiply-adds, some hundredths of a second
+
+}  // namespace
 
 Extended Generator::exit(std::size_t row) const {
   return std::accumulate(rate.begin() + static_cast<std::ptrdiff_t>(start[row]),
@@ -45,11 +50,12 @@ Generator generator_of(const Chain& chain) {
   return generator;
 }
 
-GeneratorFactors::GeneratorFactors(const Generator& generator) : GeneratorFactors(generator, false) {}
+GeneratorFactors::GeneratorFactors(const Generator& generator, const Heard& heard)
+    : GeneratorFactors(generator, false, heard) {}
 
 /// Finds envelopes and eliminates as Elimination does; of a closed generator the first state, all others eliminated, is
 /// never left.
-GeneratorFactors::GeneratorFactors(const Generator& generator, bool closed) {
+GeneratorFactors::GeneratorFactors(const Generator& generator, bool closed, const Heard& heard) {
   const std::size_t n = generator.size();
   low_.resize(n);
   high_.resize(n);
@@ -73,7 +79,12 @@ GeneratorFactors::GeneratorFactors(const Generator& generator, bool closed) {
   }
   std::vector<Extended> kill = generator.kill;
   exit_.resize(n);
+  double since_heard = heard_every;
   for (std::size_t pivot = n; pivot-- > 0;) {
+    if (heard && since_heard >= heard_every) {
+      heard();
+      since_heard = 0;
+    }
     const Extended* from = row(pivot);
     exit_[pivot] = std::accumulate(from + low_[pivot], from + pivot, kill[pivot]);
     if (closed && pivot == 0) exit_[pivot] = 1;
@@ -85,6 +96,7 @@ GeneratorFactors::GeneratorFactors(const Generator& generator, bool closed) {
       const Extended visits = target[pivot] /= exit_[pivot];
       for (std::size_t j = low_[pivot]; j < pivot; ++j) target[j] += visits * from[j];
       kill[i] += visits * kill[pivot];
+      since_heard += static_cast<double>(pivot - low_[pivot]);
     }
   }
 }
@@ -111,11 +123,11 @@ std::vector<Extended> GeneratorFactors::solve_left(std::span<const Extended> rhs
   return y;
 }
 
-std::vector<Extended> stationary_vector(Generator generator) {
+std::vector<Extended> stationary_vector(Generator generator, const Heard& heard) {
   std::fill(generator.kill.begin(), generator.kill.end(), Extended{0});
   std::vector<Extended> first(generator.size(), 0);
   first[0] = 1;
-  std::vector<Extended> visits = GeneratorFactors(generator, true).solve_left(first);
+  std::vector<Extended> visits = GeneratorFactors(generator, true, heard).solve_left(first);
   const Extended all = std::accumulate(visits.begin(), visits.end(), Extended{0});
   for (Extended& share : visits) share /= all;
   return visits;

@@ -3,6 +3,7 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <functional>
 #include <span>
 #include <vector>
 
@@ -11,6 +12,9 @@
 namespace metastable::markov {
 
 using Extended = long double;
+
+/// Is called about once an iteration, and every 1e7 multiply-adds of an elimination; what it throws ends the work.
+using Heard = std::function<void()>;
 
 /// Holds I - Q, or a diagonally scaled and shifted one: row i has the off-diagonals -rate and sums to kill[i] >= 0. The
 /// diagonal, exit(i), is a sum and never stored; so it keeps its digits however small it is.
@@ -36,15 +40,15 @@ Generator generator_of(const Chain& chain);
 class GeneratorFactors {
  public:
   /// @throws RestTooRare naming the state where a rate of leaving is zero
-  explicit GeneratorFactors(const Generator& generator);
+  explicit GeneratorFactors(const Generator& generator, const Heard& heard = {});
   /// Solves (I - Q) x = rhs, entries >= 0.
   std::vector<Extended> solve(std::span<const Extended> rhs) const;
   /// Solves y (I - Q) = rhs (row vectors), entries >= 0.
   std::vector<Extended> solve_left(std::span<const Extended> rhs) const;
 
  private:
-  friend std::vector<Extended> stationary_vector(Generator generator);
-  GeneratorFactors(const Generator& generator, bool closed);
+  friend std::vector<Extended> stationary_vector(Generator generator, const Heard& heard);
+  GeneratorFactors(const Generator& generator, bool closed, const Heard& heard);
   Extended* row(std::size_t i) { return entries_.data() + offset_[i] - low_[i]; }
   const Extended* row(std::size_t i) const { return entries_.data() + offset_[i] - low_[i]; }
 
@@ -53,7 +57,7 @@ class GeneratorFactors {
 };
 
 /// Returns the stationary distribution of an irreducible generator, its kill rates left out; sums to one.
-std::vector<Extended> stationary_vector(Generator generator);
+std::vector<Extended> stationary_vector(Generator generator, const Heard& heard = {});
 
 /// Returns the communicating classes of a chain, the states of each ascending, in an order in which every transition
 /// stays in its class or leads to a later one. O(entries).

@@ -20,9 +20,10 @@ bool eliminated(const Generator& generator) {
   return envelope.multiply_adds <= extended_multiply_adds && envelope.entries <= extended_entries;
 }
 
-GeneratorSolver::GeneratorSolver(const Generator& generator, Heard heard, std::span<const Extended> start) {
+GeneratorSolver::GeneratorSolver(const Generator& generator, Heard heard, std::span<const Extended> start)
+    : heard_(std::move(heard)) {
   if (eliminated(generator)) {
-    whole_ = std::make_unique<GeneratorFactors>(generator);
+    whole_ = std::make_unique<GeneratorFactors>(generator, heard_);
     return;
   }
   generator_ = generator;
@@ -34,12 +35,12 @@ GeneratorSolver::GeneratorSolver(const Generator& generator, Heard heard, std::s
     if (states.size() > 1) {
       Generator inside = generator.restricted_to(states, scratch);
       if (eliminated(inside)) {
-        part.factors = std::make_unique<GeneratorFactors>(inside);
+        part.factors = std::make_unique<GeneratorFactors>(inside, heard_);
       } else {
         Row begin;
         for (const std::uint32_t i : states)
           if (!start.empty()) begin.push_back(start[i]);
-        part.iterated = std::make_unique<IteratedSolver>(std::move(inside), begin, heard);
+        part.iterated = std::make_unique<IteratedSolver>(std::move(inside), begin, heard_);
       }
     }
     part.states = std::move(states);
@@ -69,6 +70,7 @@ SplitVector GeneratorSolver::solve_split(std::span<const Extended> rhs) {
   SplitVector x{Row(rhs.size(), 0), Row(rhs.size(), 0)};
   Row arriving(rhs.begin(), rhs.end());
   for (std::size_t p = parts_.size(); p-- > 0;) {
+    if (heard_ && parts_[p].factors) heard_();
     for (const std::uint32_t i : parts_[p].states)
       for (std::size_t e = generator_.start[i]; e < generator_.start[i + 1]; ++e)
         if (part_of_[generator_.column[e]] != p) arriving[i] += generator_.rate[e] * x.sum(generator_.column[e]);
@@ -88,6 +90,7 @@ Row GeneratorSolver::solve_left(std::span<const Extended> rhs) {
   Row y(rhs.begin(), rhs.end());
   for (std::size_t p = 0; p < parts_.size(); ++p) {
     Part& part = parts_[p];
+    if (heard_ && part.factors) heard_();
     Row right;
     for (const std::uint32_t i : part.states) right.push_back(y[i]);
     if (part.iterated)
@@ -112,7 +115,7 @@ std::span<const Extended> GeneratorSolver::visits() const {
 }
 
 Row stationary_distribution(const Generator& generator, const Heard& heard, std::span<const Extended> start) {
-  if (eliminated(generator)) return stationary_vector(generator);
+  if (eliminated(generator)) return stationary_vector(generator, heard);
   return IteratedSolver(generator, start, heard).visits();
 }
 

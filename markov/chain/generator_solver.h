@@ -46,6 +46,7 @@ class GeneratorSolver {
   };
   void solve_part(Part& part, std::vector<Extended>& arriving, SplitVector& x);
 
+  Heard heard_;
   Generator generator_;
   std::unique_ptr<GeneratorFactors> whole_;
   std::vector<Part> parts_;

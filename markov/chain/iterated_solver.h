@@ -1,7 +1,7 @@
 #pragma once
 // Solves a large irreducible chain by iteration where eliminating it would fill too much.
 
-#include <functional>
+#include <memory>
 #include <span>
 #include <vector>
 
@@ -9,9 +9,6 @@
 #include "markov/chain/generator.h"
 
 namespace metastable::markov {
-
-/// Is called about once an iteration; what it throws ends the work.
-using Heard = std::function<void()>;
 
 /// Iterates for the solutions of (I - Q) x = b and y (I - Q) = b on an irreducible generator.
 ///

@@ -184,5 +184,25 @@ TEST(BoundedFirstPassage, IsHeard) {
   EXPECT_EQ(calls, 5);
 }
 
+/// Returns how often work was heard of before it was ended at the given call.
+template <typename Work>
+int heard_until(int call, Work&& work) {
+  int calls = 0;
+  EXPECT_THROW(work([&] {
+                 if (++calls == call) throw std::runtime_error("enough");
+               }),
+               std::runtime_error);
+  return calls;
+}
+
+// 600 states that fill in take some 7e7 multiply-adds.
+TEST(BoundedFirstPassage, IsHeardDuringElimination) {
+  const Chain one = sparse_chain({600, 1, 0, 1, 1e-3, 0});
+  EXPECT_EQ(heard_until(3, [&](const Heard& heard) { GeneratorFactors(generator_of(one), heard); }), 3);
+  EXPECT_EQ(heard_until(3, [&](const Heard& heard) { stationary_vector(generator_of(one), heard); }), 3);
+  EXPECT_EQ(heard_until(8, [&](const Heard& heard) { bounded_quasi_stationary(one, heard); }), 8);
+  EXPECT_EQ(heard_until(3, [&](const Heard& heard) { bounded_first_passage(one, heard); }), 3);
+}
+
 }  // namespace
 }  // namespace metastable::markov
