@@ -7,6 +7,7 @@
 #include <limits>
 #include <stdexcept>
 
+#include "markov/chain/elimination.h"
 #include "markov/chain/solver.h"
 
 namespace metastable::markov {
@@ -88,6 +89,15 @@ std::vector<double> by_products(const Chain& chain, std::span<const double> rhs)
   throw ConvergenceError("passage", exact, "neither the set nor failure is reached within 100000 steps");
 }
 
+/// Not by ChainSolver: what is left outside of a set may be cyclic where the chain is not, and its products would fill.
+PassageTo by_elimination(PassageQuestion& question, int threads) {
+  if (question.undecided.empty()) return question.passage;
+  const Elimination solver = on_states(question.undecided, [&] { return Elimination(question.inside, threads); });
+  question.answer(solver.solve(question.to_set), solver.solve(question.kill),
+                  solver.solve(std::vector<double>(question.undecided.size(), 1.0)));
+  return question.passage;
+}
+
 }  // namespace
 
 LastSteps last_steps(const Chain& chain, std::span<const double> visits, int steps, std::span<const double> measure) {
@@ -155,18 +165,16 @@ PassageQuestion passage_question(const Chain& chain, std::span<const std::uint8_
 
 PassageTo passage_to(const Chain& chain, std::span<const std::uint8_t> set) {
   PassageQuestion question = passage_question(chain, set);
-  const std::vector<double> ones(question.undecided.size(), 1.0);
-  const auto fill = [&](const auto& solve) {
-    question.answer(solve(question.to_set), solve(question.kill), solve(ones));
-  };
-  if (question.undecided.empty()) return question.passage;
-  if (question.undecided.size() <= eliminated_states) {
-    const ChainSolver solver = on_states(question.undecided, [&] { return ChainSolver(question.inside); });
-    fill([&](const std::vector<double>& rhs) { return solver.solve(rhs); });
-  } else {
-    fill([&](const std::vector<double>& rhs) { return by_products(question.inside, rhs); });
-  }
+  if (question.undecided.size() <= eliminated_states) return by_elimination(question, 1);
+  const auto solve = [&](const std::vector<double>& rhs) { return by_products(question.inside, rhs); };
+  question.answer(solve(question.to_set), solve(question.kill),
+                  solve(std::vector<double>(question.undecided.size(), 1.0)));
   return question.passage;
+}
+
+PassageTo passage_by_elimination(const Chain& chain, std::span<const std::uint8_t> set, int threads) {
+  PassageQuestion question = passage_question(chain, set);
+  return by_elimination(question, threads);
 }
 
 }  // namespace metastable::markov

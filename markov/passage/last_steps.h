@@ -61,4 +61,10 @@ PassageQuestion passage_question(const Chain& chain, std::span<const std::uint8_
 ///         not settle
 PassageTo passage_to(const Chain& chain, std::span<const std::uint8_t> set);
 
+/// Does the same by elimination whatever the size, for chains whose elimination is cheap: every entry is right to a
+/// small multiple of n times rounding. Costs three solutions and no more than the whole chain's elimination.
+/// @param threads  of the elimination of full chains; 0: all cores
+/// @throws as passage_to(), but for products
+PassageTo passage_by_elimination(const Chain& chain, std::span<const std::uint8_t> set, int threads = 1);
+
 }  // namespace metastable::markov

@@ -106,9 +106,9 @@ std::vector<double> doubled(const Chain& chain, std::span<const double> start, s
 }
 
 /// Finds the probability of never coming to rest.
-double never(const Chain& chain, std::span<const double> start) {
+double never(const Chain& chain, std::span<const double> start, int threads) {
   const Reachability reach = classify(chain);
-  const PassageTo passage = passage_to(chain, std::vector<std::uint8_t>(chain.size(), 0));
+  const PassageTo passage = passage_by_elimination(chain, std::vector<std::uint8_t>(chain.size(), 0), threads);
   double never = 0;
   for (std::size_t i = 0; i < start.size(); ++i)
     if (!reach.must_rest[i]) never += start[i] * std::max(0.0, 1 - passage.fail[i]);
@@ -153,7 +153,7 @@ std::vector<double> survival_after(const Chain& chain, std::span<const double> s
   auto next = beyond.begin();
   for (std::size_t q = 0; q < steps.size(); ++q) {
     if (std::isinf(steps[q]))
-      at[q] = never(chain, start);
+      at[q] = never(chain, start, threads);
     else
       at[q] = steps[q] <= most ? near[static_cast<std::size_t>(steps[q])] : *next++;
   }

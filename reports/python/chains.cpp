@@ -154,8 +154,9 @@ py::dict committor(const HeldChain& held, const py::array_t<bool, py::array::c_s
   Call call(progress);
   call.run([&] {
     const markov::Heard heard = listening(call, held.time_limit(), "committor");
-    found = held.iterates() ? markov::bounded_passage_to(held.chain(), marked, heard)
-                            : markov::BoundedPassage{markov::passage_to(held.chain(), marked), 0};
+    found = held.iterates()
+                ? markov::bounded_passage_to(held.chain(), marked, heard)
+                : markov::BoundedPassage{markov::passage_by_elimination(held.chain(), marked, held.threads()), 0};
   });
   py::dict told;
   told["reach"] = array_of(std::move(found.passage.reach));

@@ -39,6 +39,22 @@ void expect_ruin(std::size_t n, std::size_t top, double up, double down) {
 TEST(PassageTo, IsTheGamblersRuinByElimination) { expect_ruin(60, 40, 0.5, 0.3); }
 TEST(PassageTo, IsTheGamblersRuinByProducts) { expect_ruin(3600, 3200, 0.8, 0.1); }
 
+// A fair walk takes a million steps, too many for products; it is cyclic besides. From i the chance of `top` is
+// (i + 1) / (top + 1), and the steps are (i + 1) (top - i).
+TEST(PassageByElimination, IsTheFairGamblersRuinOfAnySize) {
+  const std::size_t n = 3600, top = 3500;
+  const Chain chain = reference::birth_death(n, 0.5, 0.5, false);
+  std::vector<std::uint8_t> set(n, 0);
+  set[top] = 1;
+  const PassageTo passage = passage_by_elimination(chain, set);
+  for (const double i : {0.0, 1700.0, 3499.0}) {
+    const auto at = static_cast<std::size_t>(i);
+    EXPECT_NEAR(passage.reach[at] / ((i + 1) / 3501), 1, 1e-11) << i;
+    EXPECT_NEAR(passage.fail[at] / ((3500 - i) / 3501), 1, 1e-11) << i;
+    EXPECT_NEAR(passage.steps[at] / ((i + 1) * (3500 - i)), 1, 1e-11) << i;
+  }
+}
+
 // 0 fails or gets to 1, 1 goes on to the set {4} or to the safe state 3; 2 is not met.
 TEST(PassageTo, IsToldBesideASafeState) {
   const Chain chain({0, 1, 3, 3, 3, 3}, {1, 3, 4}, {0.5, 0.25, 0.5}, {0.5, 0.25, 1, 0, 0.5});

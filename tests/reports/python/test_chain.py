@@ -107,6 +107,15 @@ class Chains(unittest.TestCase):
         with self.assertRaisesRegex(metastable.ComputationError, "not unique"):
             metastable.chain(np.diag([.9, .9]), [.1, .1]).quasi_stationary()
 
+    @unittest.skipIf(scipy is None, "SciPy is not there")
+    def test_committors_of_large_eliminated_chains_are_eliminated(self):
+        # A fair walk between failure and the last state, some millions of steps.
+        n = 4000
+        chain = metastable.chain(scipy.sparse.diags([np.full(n - 1, .5)] * 2, [1, -1], format="csr"), [.5] + [0] * (n - 2) + [.5])
+        passage = chain.committor([n - 1])
+        self.assertIsNone(passage.error)
+        np.testing.assert_allclose(passage.reach, np.arange(1, n + 1) / n, rtol=1e-10)
+
     def test_a_safe_state_leaves_committor_and_survival(self):
         chain = metastable.chain(np.diag([.5] * 5 + [1.]), [.5] * 5 + [0.])
         passage = chain.committor([0, 1])
