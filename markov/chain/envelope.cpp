@@ -49,12 +49,16 @@ Envelope envelope_of(const Chain& chain) {
   return envelope(chain.size(), [&](std::size_t i) { return chain.columns(i); });
 }
 
+double iterated_memory(std::size_t states, std::size_t entries) {
+  return bytes_an_entry * static_cast<double>(entries) + bytes_a_state * static_cast<double>(states);
+}
+
 Way way_of(const Chain& chain, double memory) {
   const auto states = static_cast<double>(chain.size()), entries = static_cast<double>(chain.entries());
   const Envelope envelope = envelope_of(chain);
   const double stored = envelope.entries > filled * states * states ? states * states : envelope.entries;
   const double eliminated = 8 * stored + 40 * entries + 100 * states;
-  const double iterated = bytes_an_entry * entries + bytes_a_state * states;
+  const double iterated = iterated_memory(chain.size(), chain.entries());
   if (eliminated <= memory && envelope.multiply_adds <= most_multiply_adds) return Way::eliminated;
   if (iterated <= memory && work_an_entry * entries <= envelope.multiply_adds) return Way::iterated;
   if (eliminated <= memory) return Way::eliminated;

@@ -19,6 +19,9 @@ struct Envelope {
 Envelope envelope_of(std::span<const std::size_t> row_start, std::span<const std::uint32_t> column);
 Envelope envelope_of(const Chain& chain);
 
+/// Returns what iteration holds at its peak [byte].
+double iterated_memory(std::size_t states, std::size_t entries);
+
 /// How a chain is solved: ChainSolver eliminates it, GeneratorSolver iterates.
 enum class Way { eliminated, iterated };
 

@@ -71,6 +71,9 @@ GeneratorFactors::GeneratorFactors(const Generator& generator, bool closed, cons
   for (std::size_t pivot = n; pivot-- > 0;)
     for (std::size_t i = top[pivot]; i < pivot; ++i)
       if (high_[i] >= pivot) low_[i] = std::min(low_[i], low_[pivot]);
+  std::size_t all = 0;
+  for (std::size_t i = 0; i < n; ++i) all += high_[i] - low_[i] + 1;
+  entries_.reserve(all);
   for (std::size_t i = 0; i < n; ++i) {
     offset_.push_back(entries_.size());
     entries_.resize(entries_.size() + high_[i] - low_[i] + 1);

@@ -4,7 +4,10 @@
 #include <cstddef>
 #include <cstdint>
 #include <functional>
+#include <limits>
 #include <span>
+#include <type_traits>
+#include <utility>
 #include <vector>
 
 #include "markov/chain/chain.h"
@@ -13,8 +16,24 @@ namespace metastable::markov {
 
 using Extended = long double;
 
-/// Is called about once an iteration, and every 1e7 multiply-adds of an elimination; what it throws ends the work.
-using Heard = std::function<void()>;
+/// A function that is called about once an iteration, and every 1e7 multiply-adds of an elimination; what it throws
+/// ends the work. It brings along how much memory eliminations may hold beside what iterating all states takes.
+class Heard {
+ public:
+  Heard() = default;
+  /// @param memory  [byte]
+  template <typename Call>
+  requires(std::is_invocable_v<Call&> && !std::is_same_v<Call, Heard>)
+      Heard(Call call, double memory = std::numeric_limits<double>::infinity())
+      : call_(std::move(call)), memory_(memory) {}
+  explicit operator bool() const { return static_cast<bool>(call_); }
+  void operator()() const { call_(); }
+  double memory() const { return memory_; }
+
+ private:
+  std::function<void()> call_;
+  double memory_ = std::numeric_limits<double>::infinity();
+};
 
 /// Holds I - Q, or a diagonally scaled and shifted one: row i has the off-diagonals -rate and sums to kill[i] >= 0. The
 /// diagonal, exit(i), is a sum and never stored; so it keeps its digits however small it is.

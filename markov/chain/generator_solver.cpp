@@ -1,5 +1,8 @@
 #include "markov/chain/generator_solver.h"
 
+#include <algorithm>
+#include <cmath>
+#include <limits>
 #include <numeric>
 #include <utility>
 
@@ -13,16 +16,26 @@ using Row = std::vector<Extended>;
 
 constexpr double extended_multiply_adds = 5e9, extended_entries = 4e7;
 
+/// Returns what the factors take beside what iterating would [byte]; infinite where they are not to be made.
+double memory_beside(const Generator& generator) {
+  const Envelope envelope = envelope_of(generator.start, generator.column);
+  if (envelope.multiply_adds > extended_multiply_adds || envelope.entries > extended_entries)
+    return std::numeric_limits<double>::infinity();
+  const double factors = static_cast<double>(sizeof(Extended)) * envelope.entries;
+  return std::max(0.0, factors - iterated_memory(generator.size(), generator.column.size()));
+}
+
 }  // namespace
 
-bool eliminated(const Generator& generator) {
-  const Envelope envelope = envelope_of(generator.start, generator.column);
-  return envelope.multiply_adds <= extended_multiply_adds && envelope.entries <= extended_entries;
+bool eliminated(const Generator& generator, double memory) {
+  const double beside = memory_beside(generator);
+  return std::isfinite(beside) && beside <= memory;
 }
 
 GeneratorSolver::GeneratorSolver(const Generator& generator, Heard heard, std::span<const Extended> start)
     : heard_(std::move(heard)) {
-  if (eliminated(generator)) {
+  double left = heard_.memory();
+  if (eliminated(generator, left)) {
     whole_ = std::make_unique<GeneratorFactors>(generator, heard_);
     return;
   }
@@ -34,7 +47,9 @@ GeneratorSolver::GeneratorSolver(const Generator& generator, Heard heard, std::s
     for (const std::uint32_t i : states) part_of_[i] = static_cast<std::uint32_t>(parts_.size());
     if (states.size() > 1) {
       Generator inside = generator.restricted_to(states, scratch);
-      if (eliminated(inside)) {
+      const double beside = memory_beside(inside);
+      if (std::isfinite(beside) && beside <= left) {
+        left -= beside;
         part.factors = std::make_unique<GeneratorFactors>(inside, heard_);
       } else {
         Row begin;
@@ -115,7 +130,7 @@ std::span<const Extended> GeneratorSolver::visits() const {
 }
 
 Row stationary_distribution(const Generator& generator, const Heard& heard, std::span<const Extended> start) {
-  if (eliminated(generator)) return stationary_vector(generator, heard);
+  if (eliminated(generator, heard.memory())) return stationary_vector(generator, heard);
   return IteratedSolver(generator, start, heard).visits();
 }
 

@@ -2,6 +2,7 @@
 // Solves I - Q of any size: by elimination where that is cheap, and class by class, by iteration where it is not.
 
 #include <cstdint>
+#include <limits>
 #include <memory>
 #include <optional>
 #include <span>
@@ -13,8 +14,8 @@
 namespace metastable::markov {
 
 /// Says whether GeneratorFactors is to take a generator: whether its elimination takes no more than 5e9 multiply-adds
-/// and 4e7 entries, some ten seconds and 0.6 GB.
-bool eliminated(const Generator& generator);
+/// and 4e7 entries, some ten seconds and 0.6 GB, and no more than `memory` [byte] beside what iterating it would.
+bool eliminated(const Generator& generator, double memory = std::numeric_limits<double>::infinity());
 
 /// A vector as the sum of two, whose entries differ by less than their sum can hold.
 struct SplitVector {
@@ -27,6 +28,7 @@ struct SplitVector {
 /// Holds what solving a generator takes. From every state it must be possible to leave.
 class GeneratorSolver {
  public:
+  /// Classes are eliminated as long as heard.memory() is left for their factors, which are held together.
   /// @param start  visits to begin iterations with, of all states, or nothing
   /// @throws RestTooRare, ConvergenceError as GeneratorFactors and IteratedSolver
   explicit GeneratorSolver(const Generator& generator, Heard heard = {}, std::span<const Extended> start = {});

@@ -2,6 +2,7 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <chrono>
 #include <cmath>
 #include <memory>
@@ -33,10 +34,12 @@ class HeldChain {
       : chain_(std::move(chain)),
         threads_(threads),
         time_limit_(time_limit),
-        way_(markov::way_of(chain_, memory_gb * 1e9)) {}
+        way_(markov::way_of(chain_, memory_gb * 1e9)),
+        spare_(std::max(0.0, memory_gb * 1e9 - markov::iterated_memory(chain_.size(), chain_.entries()))) {}
   const markov::Chain& chain() const { return chain_; }
   int threads() const { return threads_; }
   double time_limit() const { return time_limit_; }
+  double spare() const { return spare_; }  ///< memory beside what iterating takes [byte]
   bool iterates() const { return way_ == markov::Way::iterated; }
   const markov::ChainSolver& solver() {
     if (!solver_) solver_ = std::make_unique<markov::ChainSolver>(chain_, threads_);
@@ -58,19 +61,22 @@ class HeldChain {
   int threads_;
   double time_limit_;
   markov::Way way_;
+  double spare_;
   std::unique_ptr<markov::ChainSolver> solver_;
   std::optional<markov::BoundedQuasiStationary> quasi_;
 };
 
-// Listens for Ctrl-C and for the end of the time.
-markov::Heard listening(Call& call, double time_limit, const char* doing) {
+// Listens for Ctrl-C and for the end of the time, and says how much memory there is.
+markov::Heard listening(Call& call, const HeldChain& held, const char* doing) {
   const auto began = std::chrono::steady_clock::now();
-  return [&call, time_limit, doing, began] {
+  const double time_limit = held.time_limit();
+  const auto listen = [&call, time_limit, doing, began] {
     call.tell(0, doing);
     const std::chrono::duration<double> spent = std::chrono::steady_clock::now() - began;
     if (spent.count() > time_limit)
       throw std::runtime_error(fmt::format("chain: {} was not done after {:g} s (time_limit)", doing, time_limit));
   };
+  return {listen, held.spare()};
 }
 
 // Takes rows of compressed storage, columns ascending; the diagonal is looked at and left out. Where a row gives its
@@ -115,7 +121,7 @@ py::dict first_passage(HeldChain& held, const py::object& progress) {
   Call call(progress);
   call.run([&] {
     if (held.iterates()) {
-      steps = markov::bounded_first_passage(held.chain(), listening(call, held.time_limit(), "first passage"));
+      steps = markov::bounded_first_passage(held.chain(), listening(call, held, "first passage"));
       return;
     }
     steps.mean = markov::mean_first_passage(held.solver());
@@ -133,7 +139,7 @@ py::dict first_passage(HeldChain& held, const py::object& progress) {
 py::dict quasi_stationary(HeldChain& held, const py::object& progress) {
   Call call(progress);
   markov::BoundedQuasiStationary found;
-  call.run([&] { found = held.quasi_stationary(listening(call, held.time_limit(), "quasi-stationary")); });
+  call.run([&] { found = held.quasi_stationary(listening(call, held, "quasi-stationary")); });
   py::dict told;
   told["distribution"] = array_of(std::move(found.quasi.distribution));
   told["survival_weight"] = array_of(std::move(found.quasi.survival_weight));
@@ -153,7 +159,7 @@ py::dict committor(const HeldChain& held, const py::array_t<bool, py::array::c_s
   markov::BoundedPassage found;
   Call call(progress);
   call.run([&] {
-    const markov::Heard heard = listening(call, held.time_limit(), "committor");
+    const markov::Heard heard = listening(call, held, "committor");
     found = held.iterates()
                 ? markov::bounded_passage_to(held.chain(), marked, heard)
                 : markov::BoundedPassage{markov::passage_by_elimination(held.chain(), marked, held.threads()), 0};
@@ -172,7 +178,7 @@ py::array survival(HeldChain& held, const Number& start, const Number& steps, co
   std::vector<double> at;
   Call call(progress);
   call.run([&] {
-    const markov::Heard heard = listening(call, held.time_limit(), "survival");
+    const markov::Heard heard = listening(call, held, "survival");
     at = held.iterates()
              ? markov::bounded_survival_after(
                    held.chain(), from, after,

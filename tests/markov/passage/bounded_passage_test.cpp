@@ -184,6 +184,19 @@ TEST(BoundedFirstPassage, IsHeard) {
   EXPECT_EQ(calls, 5);
 }
 
+TEST(BoundedFirstPassage, IteratesWhereFactorsLeaveTheMemory) {
+  // Factors of 500 states that fill in take some 3.6 MB, iterating them 2 MB.
+  const Chain chain = sparse_chain({500, 1, 0, 1, 1e-3, 0});
+  const Generator generator = generator_of(chain);
+  EXPECT_TRUE(eliminated(generator, 1e7));
+  EXPECT_FALSE(eliminated(generator, 1e6));
+  const BoundedSteps all = bounded_first_passage(chain), little = bounded_first_passage(chain, Heard([] {}, 0));
+  EXPECT_TRUE(GeneratorSolver(generator, Heard([] {}, 1e7)).visits().empty());
+  EXPECT_FALSE(GeneratorSolver(generator, Heard([] {}, 1e6)).visits().empty());
+  for (std::size_t i = 0; i < chain.size(); ++i) ASSERT_NEAR(little.mean[i] / all.mean[i], 1, 1e-9) << i;
+  EXPECT_GE(bounded_quasi_stationary(chain, Heard([] {}, 0)).rate_upper, bounded_quasi_stationary(chain).rate_lower);
+}
+
 /// Returns how often work was heard of before it was ended at the given call.
 template <typename Work>
 int heard_until(int call, Work&& work) {
