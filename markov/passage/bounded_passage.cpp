@@ -165,22 +165,24 @@ Steps expected_steps(const Chain& chain, GeneratorSolver& solver) {
 
 /// Bounds the error of standard deviations, relative to them or, where they are less, to one step.
 ///
-/// With m the means found, at most w off, g the variance that a step adds by them, v the variance found, and what
-/// (I - Q) v leaves of g at most b (2 m - 1 + g), the second moment v + m^2, whose right side is 2 m - 1, is at most
-/// 6 w + 3 b off, because the solution for g is no more than the second moment, and v at most 8 w + 3 b of that.
+/// With m the means found, w the largest of |m - Q m - 1|, g the variance that a step adds by them, v the variance
+/// found, and what (I - Q) v leaves of g at most b (2 m - 1 + g), the second moment v + m^2, whose right side is 2 m -
+/// 1, is at most 6 w + 3 b off, because the solution for g is no more than the second moment, and v at most 9 w + 3 b
+/// of that.
 /// @param unit  of the means; the variances are in its square
 double sd_error(const Chain& chain, const Steps& steps, Extended unit, const Row& of_a_step,
                 const SplitVector& variance) {
-  Extended beside = 0;  // b
+  Extended beside = 0, mean_off = 0;  // b, w
   for (std::size_t i = 0; i < chain.size(); ++i) {
-    const Difference one = difference(chain, i, variance);
+    const Difference mean = difference(chain, i, steps.mean), one = difference(chain, i, variance);
+    mean_off = std::max(mean_off, std::abs(mean.value - 1) + mean.error);
     const auto terms = static_cast<Extended>(chain.columns(i).size() + 3);
     const Extended off = std::abs(of_a_step[i] - one.value) + one.error + 4 * terms * extended_rounding * of_a_step[i];
     if (!std::isfinite(off)) return std::numeric_limits<double>::infinity();
     const Extended against = (2 * std::max<Extended>(1, steps.bounds.lower[i]) - 1) / unit / unit + of_a_step[i];
     beside = std::max(beside, off / against);
   }
-  const Extended share = 8 * static_cast<Extended>(steps.error()) + 3 * beside;
+  const Extended share = 9 * mean_off + 3 * beside;
   if (!(share < 0.5L)) return std::numeric_limits<double>::infinity();
   Extended most = 0;
   for (std::size_t i = 0; i < chain.size(); ++i) {

@@ -105,6 +105,30 @@ TEST(BoundedFirstPassage, ProvesTheSdOfBlocksThatAreHardlyLeft) {
     ASSERT_NEAR(steps.sd[i] / static_cast<double>(i < block ? sd_rare : sd_often), 1, 1e-6) << i;
 }
 
+// All states lead, alike, into 50 states that follow one another surely to rest: their sd is zero.
+TEST(BoundedFirstPassage, TakesStepsThatAreSure) {
+  const double enter = 1e-6;
+  const Chain random = sparse_chain({states, 1, 0, 1, 0, 0});
+  std::vector<std::size_t> start{0};
+  std::vector<std::uint32_t> column;
+  std::vector<double> value, kill(states + 50, 0.0);
+  kill.back() = 1;
+  for (std::uint32_t i = 0; i + 1 < states + 50; ++i) {
+    const std::size_t links = i < states ? random.columns(i).size() : 0;
+    for (std::size_t e = 0; e < links; ++e) {
+      column.push_back(random.columns(i)[e]);
+      value.push_back(random.values(i)[e] * (1 - enter));
+    }
+    column.push_back(i < states ? states : i + 1);
+    value.push_back(i < states ? enter : 1);
+    start.push_back(column.size());
+  }
+  start.push_back(column.size());
+  const BoundedSteps steps = bounded_first_passage(Chain(start, column, value, kill));
+  EXPECT_NEAR(steps.sd[3] / (std::sqrt(1 - enter) / enter), 1, 1e-6);
+  for (std::size_t i = states; i < states + 50; ++i) EXPECT_NEAR(steps.sd[i], 0, 1e-6);
+}
+
 TEST(StepsEnclosed, TellsHowFarAVectorBesideItsBoundsIsOff) {
   const Chain one({0, 0}, {}, {}, {0.25});
   for (const double found : {4.0, 8.0, 2.0}) {
