@@ -6,6 +6,7 @@
 #include <chrono>
 #include <cmath>
 #include <memory>
+#include <mutex>
 #include <optional>
 #include <stdexcept>
 
@@ -41,11 +42,14 @@ class HeldChain {
   double time_limit() const { return time_limit_; }
   double spare() const { return spare_; }  ///< memory beside what iterating takes [byte]
   bool iterates() const { return way_ == markov::Way::iterated; }
+  // These are made once, whichever of several Python threads asks first.
   const markov::ChainSolver& solver() {
+    const std::lock_guard lock(*making_);
     if (!solver_) solver_ = std::make_unique<markov::ChainSolver>(chain_, threads_);
     return *solver_;
   }
   const markov::BoundedQuasiStationary& quasi_stationary(const markov::Heard& heard) {
+    const std::lock_guard lock(*making_);
     if (!quasi_) quasi_ = iterates() ? bounded_quasi_stationary(chain_, heard) : eliminated_quasi_stationary();
     return *quasi_;
   }
@@ -62,6 +66,7 @@ class HeldChain {
   double time_limit_;
   markov::Way way_;
   double spare_;
+  std::unique_ptr<std::recursive_mutex> making_ = std::make_unique<std::recursive_mutex>();
   std::unique_ptr<markov::ChainSolver> solver_;
   std::optional<markov::BoundedQuasiStationary> quasi_;
 };

@@ -176,7 +176,7 @@ TEST(DiagnosisText, SaysTheVerdictFirstAndAnswersEveryQuestion) {
   const std::string text = diagnosis_text(sample(), 400);
   EXPECT_EQ(text.find("verdict: explained\nOne cause explains it: leg_contact.\n"), 0U);
   std::size_t last = 0;
-  for (const char* part : {"Next: Tell the causes apart before changing the model: slope 8.5 deg would do it best",
+  for (const char* part : {"Next: Tell the causes apart before changing the model: slopes flatter by 2 deg would do it best",
                            "Is there a gap?",
                            "Where it lies",
                            "leg 3, collision",
@@ -202,7 +202,7 @@ TEST(DiagnosisText, SaysTheVerdictFirstAndAnswersEveryQuestion) {
                            "What these data cannot say",
                            "where the gap lies",
                            "The next experiment",
-                           "slope 8.5 deg",
+                           "slopes flatter by 2 deg",
                            "Data",
                            "The noise was taken"}) {
     const std::size_t at = text.find(part, last);
