@@ -891,4 +891,7 @@ def chain(matrix, kill, *, memory_gb=2, time_limit=900, threads=0):
     else:
         i, columns = matrix.nonzero()
         starts, values = numpy.searchsorted(i, numpy.arange(len(kill) + 1)), matrix[i, columns]
-    return Chain(_metastable.Chain(starts, columns, values, kill, threads, memory_gb, time_limit))
+    for what, given in (("memory_gb", memory_gb), ("time_limit", time_limit)):
+        if not isinstance(given, numbers.Real):
+            raise InputError(f"{what}: a number expected, not {given!r}")
+    return Chain(_metastable.Chain(starts, columns, values, kill, threads, float(memory_gb), float(time_limit)))

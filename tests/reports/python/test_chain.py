@@ -70,6 +70,8 @@ class Chains(unittest.TestCase):
             metastable.chain(matrix, np.full(n, k), memory_gb=0.001)
         with self.assertRaisesRegex(metastable.ComputationError, "not done after 1e-06 s"):
             metastable.chain(matrix, np.full(n, k), time_limit=1e-6).first_passage()
+        with self.assertRaisesRegex(metastable.InputError, "time_limit: a number expected, not None"):
+            metastable.chain(matrix, np.full(n, k), time_limit=None)
         with self.assertRaisesRegex(metastable.InputError, "memory_gb: -1"):
             metastable.chain(matrix, np.full(n, k), memory_gb=-1)
 
