@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <iterator>
+#include <limits>
 #include <optional>
 #include <utility>
 
@@ -266,20 +267,34 @@ std::vector<RankedCause> rank_larger_sets(const RankingProblem& problem, const S
 
 void bound_by_parts(const RankingProblem& problem, const SingleEffects& singles, const std::vector<RankedCause>& parts,
                     std::vector<RankedCause>& sets) {
-  for (RankedCause& set : sets)
+  for (RankedCause& set : sets) {
+    const RankedCause* best = nullptr;
+    const Candidate* beyond_best = nullptr;
+    double least = std::numeric_limits<double>::infinity();
     for (const EffectTerm& last : set.terms) {
       std::vector<EffectTerm> others = set.terms;
       std::erase_if(others, [&](const EffectTerm& one) { return one.candidate == last.candidate; });
       const auto part = find_set(parts, others);
       if (part == parts.end() || !part->fitted() || !std::isfinite(part->evidence)) continue;
-      // Beside an exact effect the others have no error of form to be forgiven: it comes first.
-      if (last.candidate->exact && set.gain > part->gain + hardly_more) continue;
-      const double beyond = earned(problem.model, set.fit, part->fit,
-                                   exact_part(singles.causes, part->terms, problem.recalibrated), problem.rules);
-      set.evidence =
-          std::min(set.evidence, part->evidence + evidence_of_last(problem, singles, last.candidate, beyond) +
-                                     log_prior_of_one_more(problem, set.terms.size()));
+      const double beyond = set.gain - part->gain;
+      if (beyond <= hardly_more) {
+        const auto parameters = static_cast<double>(last.candidate->parameters.size());
+        least = std::min(least, part->evidence + evidence_of_gain(std::max(0.0, beyond), parameters, problem.rules));
+      } else if (!last.candidate->exact && (!best || part->evidence > best->evidence)) {
+        // Beside an exact effect the others have no error of form to be forgiven: it is not the last.
+        best = &*part;
+        beyond_best = last.candidate;
+      }
     }
+    const double prior = log_prior_of_one_more(problem, set.terms.size());
+    if (best)
+      set.evidence =
+          best->evidence + prior +
+          evidence_of_last(problem, singles, beyond_best,
+                           earned(problem.model, set.fit, best->fit,
+                                  exact_part(singles.causes, best->terms, problem.recalibrated), problem.rules));
+    set.evidence = std::min(set.evidence, least + prior);
+  }
 }
 
 }  // namespace metastable::analysis

@@ -44,9 +44,9 @@ double gain_together(const RankingProblem& problem, const SingleEffects& singles
 std::vector<RankedCause> rank_larger_sets(const RankingProblem& problem, const SingleEffects& singles,
                                           std::vector<RankedCause>& pairs);
 
-/// Bounds the evidence of sets by what each effect, taken as the last one, earns beyond the same without it: the order
-/// that says least decides, whichever came first in the search, but effects that are exact come first. A set that gains
-/// nothing beyond a part of it is that part.
+/// Weighs sets by what they earn beyond the best of their parts, whichever came first in the search, so that sets that
+/// act alike are worth alike; the last effect is none that is exact. A set that gains nothing beyond a part of it is
+/// that part.
 /// @param parts  hypotheses of one effect less among them; may be `sets`
 void bound_by_parts(const RankingProblem& problem, const SingleEffects& singles, const std::vector<RankedCause>& parts,
                     std::vector<RankedCause>& sets);

@@ -116,18 +116,22 @@ TEST(EffectSets, HoldWhatActsLikeOneOfThem) {
   EXPECT_NEAR(evidence({"wave 0", "wave 1", "wave 2"}), evidence({"wave 5", "wave 1", "wave 2"}), 6);
 }
 
-// The order in which the search met two effects does not decide what the pair is worth.
-TEST(EffectSets, AreWorthNoMoreThanTheirPartsAndWhatTheOtherEarns) {
+// The order in which the search met two effects does not decide what the pair is worth: the stronger one comes first.
+TEST(EffectSets, AreWorthWhatTheyEarnBeyondTheBestPart) {
   const AlikeWaves model(line(0, 1, 2400), 3);
   const CauseRanking ranking = ranked(model);
   ASSERT_FALSE(ranking.pairs.empty());
-  for (const RankedCause& pair : ranking.pairs)
-    for (const EffectTerm& first : pair.terms)
-      for (const RankedCause& single : ranking.singles)
-        if (single.terms[0].candidate == first.candidate && single.fitted()) {
-          EXPECT_LE(pair.evidence, single.evidence + evidence_of_gain(pair.gain - single.gain, 1, Rules{}) +
-                                       std::log(0.05 / 2.5) + 1e-9);
-        }
+  const auto single = [&](const EffectTerm& term) -> const RankedCause& {
+    return *std::ranges::find_if(ranking.singles,
+                                 [&](const RankedCause& one) { return one.terms[0].candidate == term.candidate; });
+  };
+  for (const RankedCause& pair : ranking.pairs) {
+    const RankedCause &one = single(pair.terms[0]), &other = single(pair.terms[1]),
+                      &stronger = one.evidence > other.evidence ? one : other;
+    if (!one.fitted() || !other.fitted()) continue;
+    EXPECT_LE(pair.evidence, stronger.evidence + evidence_of_gain(pair.gain - stronger.gain, 1, Rules{}) +
+                                 std::log(0.05 / 2.5) + 1e-9);
+  }
 }
 
 // One more effect is as likely as the rule says, whichever of the others it is.
