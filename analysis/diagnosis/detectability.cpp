@@ -157,6 +157,12 @@ double separation(const AtIssue& issue, const EffectScan& scan, const Swap& swap
   return std::max(0.0, size.dot(scan.information(own, own) * size) - (root.transpose() * cross).squaredNorm());
 }
 
+std::vector<std::size_t> by_separation(const std::vector<NextExperiment>& all) {
+  std::vector<double> separations;
+  for (const NextExperiment& one : all) separations.push_back(one.separation);
+  return falling_order(separations);
+}
+
 // Returns what an experiment would tell on average between the cause and its rivals.
 double mean_separation(const TransitionModel& experiment, const std::vector<double>& nuisance, const AtIssue& issue,
                        const std::vector<Swap>& swaps, const Rules& rules) {
@@ -209,7 +215,7 @@ std::vector<NextExperiment> next_experiments(const TransitionModel& model, const
   if (swaps.empty()) return all;
   const AtIssue issue = at_issue(cause, swaps);
   std::vector<ChangedExperiment> designs = model.alternatives(cause.nuisance, issue.shared, seed);
-  std::map<std::string, NextExperiment> alone;  // the best of each kind by itself
+  std::map<std::string, double> alone;  // amount of each kind that is best by itself
   std::shared_ptr<const TransitionModel> changed;
   NextExperiment base;
   while (!designs.empty()) {
@@ -223,11 +229,11 @@ std::vector<NextExperiment> next_experiments(const TransitionModel& model, const
       made[i] = designs[i].make();
       one.separation = mean_separation(*made[i], cause.nuisance, issue, swaps, rules);
     });
-    if (alone.empty())
-      for (const NextExperiment& one : weighed)
-        if (!one.changes.empty())
-          if (NextExperiment& best = alone[one.changes[0].first]; one.separation >= best.separation) best = one;
-    const auto best = std::ranges::max_element(weighed, {}, &NextExperiment::separation);
+    const std::vector<std::size_t> order = by_separation(weighed);
+    if (base.changes.empty())
+      for (const std::size_t k : order)
+        if (!weighed[k].changes.empty()) alone.insert(weighed[k].changes[0]);
+    const auto best = weighed.begin() + static_cast<std::ptrdiff_t>(order.front());
     const double to_beat = base.changes.empty() ? weighed.front().separation : base.separation;
     designs.clear();
     if (!best->changes.empty() && best->separation > worth_a_change * to_beat) {
@@ -236,17 +242,14 @@ std::vector<NextExperiment> next_experiments(const TransitionModel& model, const
       for (ChangedExperiment& one : changed->alternatives(cause.nuisance, issue.shared, seed)) {
         const bool has =
             std::ranges::find(base.changes, one.kind, &std::pair<std::string, double>::first) != base.changes.end();
-        if (const auto own = alone.find(one.kind);
-            !has && own != alone.end() && own->second.changes[0].second == one.amount)
+        if (const auto own = alone.find(one.kind); !has && own != alone.end() && own->second == one.amount)
           designs.push_back(std::move(one));
       }
     }
     std::ranges::move(weighed, std::back_inserter(all));
   }
-  std::vector<double> separations;
-  for (const NextExperiment& one : all) separations.push_back(one.separation);
   std::vector<NextExperiment> ranked;
-  for (const std::size_t k : falling_order(separations)) ranked.push_back(std::move(all[k]));
+  for (const std::size_t k : by_separation(all)) ranked.push_back(std::move(all[k]));
   return ranked;
 }
 

@@ -38,9 +38,14 @@ EffectScan scan_beside(const RankingProblem& problem, const SingleEffects& singl
   return scan_effects(problem.model, base.fit, others, problem.threads, {&singles.scan, base.terms.front().candidate});
 }
 
+std::vector<std::size_t> by_evidence(const std::vector<RankedCause>& all) {
+  std::vector<double> evidence;
+  for (const RankedCause& one : all) evidence.push_back(one.evidence);
+  return falling_order(evidence);
+}
+
 const RankedCause* best_of(const std::vector<RankedCause>& all) {
-  const auto best = std::ranges::max_element(all, {}, &RankedCause::evidence);
-  return best == all.end() ? nullptr : &*best;
+  return all.empty() ? nullptr : &all[by_evidence(all).front()];
 }
 
 auto find_set(const std::vector<RankedCause>& all, const std::vector<EffectTerm>& terms) {
@@ -92,11 +97,9 @@ void add_pairs_within(const RankingProblem& problem, const SingleEffects& single
 // Returns the best hypotheses of a kind, the best one first; of those that gain the same and differ in one effect,
 // which act alike, one stands for all.
 std::vector<RankedCause> strongest_of(const std::vector<RankedCause>& all, std::size_t most, const Rules& rules) {
-  std::vector<double> evidence;
-  for (const RankedCause& one : all) evidence.push_back(one.evidence);
   std::vector<RankedCause> strongest;
-  for (const std::size_t k : falling_order(evidence)) {
-    if (strongest.size() == most || !std::isfinite(evidence[k])) break;
+  for (const std::size_t k : by_evidence(all)) {
+    if (strongest.size() == most || !std::isfinite(all[k].evidence)) break;
     const bool alike = std::ranges::any_of(strongest, [&](const RankedCause& better) {
       const auto shared = std::ranges::count_if(all[k].terms, [&](const EffectTerm& term) {
         return std::ranges::find(better.terms, term.candidate, &EffectTerm::candidate) != better.terms.end();
@@ -268,8 +271,9 @@ std::vector<RankedCause> rank_larger_sets(const RankingProblem& problem, const S
 void bound_by_parts(const RankingProblem& problem, const SingleEffects& singles, const std::vector<RankedCause>& parts,
                     std::vector<RankedCause>& sets) {
   for (RankedCause& set : sets) {
-    const RankedCause* best = nullptr;
-    const Candidate* beyond_best = nullptr;
+    std::vector<const RankedCause*> whole;  // parts beyond which it gains, each with the effect that it lacks
+    std::vector<const Candidate*> lacks;
+    std::vector<double> evidence;
     double least = std::numeric_limits<double>::infinity();
     for (const EffectTerm& last : set.terms) {
       std::vector<EffectTerm> others = set.terms;
@@ -280,19 +284,19 @@ void bound_by_parts(const RankingProblem& problem, const SingleEffects& singles,
       if (beyond <= hardly_more) {
         const auto parameters = static_cast<double>(last.candidate->parameters.size());
         least = std::min(least, part->evidence + evidence_of_gain(std::max(0.0, beyond), parameters, problem.rules));
-      } else if (!last.candidate->exact && (!best || part->evidence > best->evidence)) {
-        // Beside an exact effect the others have no error of form to be forgiven: it is not the last.
-        best = &*part;
-        beyond_best = last.candidate;
+      } else if (!last.candidate->exact) {
+        // An exact effect is not the last one: the others, beside it, have no error of form to be forgiven.
+        whole.push_back(&*part), lacks.push_back(last.candidate), evidence.push_back(part->evidence);
       }
     }
     const double prior = log_prior_of_one_more(problem, set.terms.size());
-    if (best)
-      set.evidence =
-          best->evidence + prior +
-          evidence_of_last(problem, singles, beyond_best,
-                           earned(problem.model, set.fit, best->fit,
-                                  exact_part(singles.causes, best->terms, problem.recalibrated), problem.rules));
+    if (!whole.empty()) {
+      const std::size_t k = falling_order(evidence).front();
+      const Fit& exact = exact_part(singles.causes, whole[k]->terms, problem.recalibrated);
+      set.evidence = whole[k]->evidence + prior +
+                     evidence_of_last(problem, singles, lacks[k],
+                                      earned(problem.model, set.fit, whole[k]->fit, exact, problem.rules));
+    }
     set.evidence = std::min(set.evidence, least + prior);
   }
 }

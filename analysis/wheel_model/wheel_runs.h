@@ -77,13 +77,6 @@ inline constexpr double fastest_tabulated = 15;
 /// Tabulates the landings of every condition anew, under `settled`; under other laws there are none.
 void tabulate_landings(WheelRuns& measured);
 
-/// Marks the collisions for which the law `settled` holds: slow enough that the landed foot stands before the next one
-/// touches, as the one before was. Where restitution varies so much that few are, omega+ tells: a foot stands if it
-/// does with the largest restitution that can have left it so fast, that of a foot that sticks. A first impact then
-/// counts if the foot before stood, and what follows it if its own does, too. Both go by what was seen before, so that
-/// they choose no outcomes. So it is with legs that spring more than the others. Under other laws all count.
-void mark_counted(const WheelRuns& measured, WheelRun& run);
-
 /// Reads an experiment. A missing leg is found from the stances where omega_plus is there, else legs of mean length are
 /// taken; missing positions and times follow from the geometry. Where digits are most of the noise a normal error is
 /// added to the reported speeds, as the notes say.

@@ -9,6 +9,7 @@
 #include <optional>
 
 #include "analysis/statistics/random.h"
+#include "analysis/wheel_model/standing_feet.h"
 #include "dynamics/numerics/truncated_normal.h"
 #include "dynamics/settled/settled_density.h"
 

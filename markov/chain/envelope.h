@@ -9,7 +9,7 @@
 
 namespace metastable::markov {
 
-/// What elimination from the last state to the first stores and does.
+/// The cost of an elimination from the last state to the first.
 struct Envelope {
   double entries = 0;        ///< of the rows, what fills in included
   double multiply_adds = 0;  ///< of the elimination

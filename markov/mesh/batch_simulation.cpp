@@ -10,6 +10,7 @@
 #include <utility>
 
 #include "markov/mesh/score_lattice.h"
+#include "markov/normal_95.h"
 #include "markov/parallel.h"
 #include "markov/transition_rows/draws.h"
 
@@ -109,6 +110,47 @@ std::vector<std::uint64_t> follow_walks(const BatchMap& map, std::span<const dou
   std::vector<std::uint64_t> steps;
   follow_all(map, start, longest, unlimited, steps);
   return steps;
+}
+
+std::string simulated_beside(const BatchMap& map, std::span<const double> start,
+                             const std::vector<std::uint64_t>& walked, std::uint64_t longest,
+                             const SimulationOptions& options) {
+  constexpr double enough_failed = 20, most = 4096;  // trials leave 1.6 % of their mean
+  constexpr std::uint64_t unforeseen = 2;            // times the steps that are foreseen from the walks
+  double failed = 0, steps = 0;
+  for (const std::uint64_t n : walked) {
+    failed += n > 0;
+    steps += static_cast<double>(n > 0 ? n : longest);
+  }
+  const double trials = failed < enough_failed ? 0 : static_cast<double>(options.most_steps) / (steps / failed);
+  if (trials < static_cast<double>(fewest_trials)) return "";
+  SimulationOptions asked = options;
+  asked.trials = static_cast<std::size_t>(std::min(trials, most));
+  asked.most_steps = unforeseen * options.most_steps;
+  const std::optional<SimulatedSteps> alone = simulate_steps(map, start, asked);
+  if (!alone) return "";
+  const double half = normal_95 * alone->standard_error;
+  return fmt::format("; {} simulated trials fail after {:.4g} steps in the mean (95 % interval {:.4g} to {:.4g})",
+                     alone->trials, alone->mean, alone->mean - half, alone->mean + half);
+}
+
+std::pair<std::string, bool> walks_in_words(const BatchMap& map, std::span<const double> start,
+                                            const SimulationOptions& options) {
+  SimulationOptions asked = options;
+  asked.trials = std::clamp<std::size_t>(options.most_steps, 2, walk_count);
+  const std::size_t walks = asked.trials;
+  const std::uint64_t longest = std::max<std::uint64_t>(1, options.most_steps / walks);
+  std::vector<std::uint64_t> walked = follow_walks(map, start, longest, asked);
+  const auto lasting = static_cast<std::size_t>(std::count(walked.begin(), walked.end(), 0U));
+  if (lasting == walks) return {fmt::format("none of {} simulated walks of {} steps fails", walks, longest), false};
+  if (lasting > 0)
+    return {fmt::format("{} of {} simulated walks fail within {} steps{}", walks - lasting, walks, longest,
+                        simulated_beside(map, start, walked, longest, options)),
+            true};
+  const SimulatedSteps all = summarize_steps(std::move(walked));
+  return {fmt::format("{} of {} simulated walks fail, after {:.4g} steps in the mean (standard error {:.2g})", walks,
+                      walks, all.mean, all.standard_error),
+          true};
 }
 
 }  // namespace metastable::markov

@@ -4,6 +4,8 @@
 #include <cstdint>
 #include <optional>
 #include <span>
+#include <string>
+#include <utility>
 #include <vector>
 
 #include "markov/mesh/batch_map.h"
@@ -39,5 +41,22 @@ SimulatedSteps summarize_steps(std::vector<std::uint64_t> steps);
 /// @throws as simulate_steps()
 std::vector<std::uint64_t> follow_walks(const BatchMap& map, std::span<const double> start, std::uint64_t longest,
                                         const SimulationOptions& options);
+
+/// The fewest trials to failure from which a mean is told, and how many walks are followed where not so many would
+/// fail.
+inline constexpr std::size_t fewest_trials = 100, walk_count = 512;
+
+/// Says what trials to failure find beside walks of which some failed: "; ..." where enough fail within the steps
+/// allowed, else nothing.
+/// @param walked  the step in which each walk failed, 0 if it walked on for `longest` steps
+/// @param options  most_steps: about so many steps are taken; `trials` is not read  @throws as simulate_steps()
+std::string simulated_beside(const BatchMap& map, std::span<const double> start,
+                             const std::vector<std::uint64_t>& walked, std::uint64_t longest,
+                             const SimulationOptions& options);
+
+/// Says what direct simulation finds where there is nothing else, and whether walks fail in it.
+/// @param options  most_steps: about so many steps are taken; `trials` is not read  @throws as simulate_steps()
+std::pair<std::string, bool> walks_in_words(const BatchMap& map, std::span<const double> start,
+                                            const SimulationOptions& options);
 
 }  // namespace metastable::markov

@@ -34,11 +34,9 @@ constexpr double widest = 4;          // of the interval: its end over its begin
 constexpr double most_blind = 0.1;    // of the failures, in blind spots: beyond, bands are stepped over
 constexpr double least = 0.25;        // of what the extrapolation's last order moved: its error
 constexpr double row_error = 5e-4;    // what reading rows off curves may leave, about so much
-constexpr std::size_t fewest_trials = 100;
 constexpr std::size_t most_trials = 10000000;  // they leave 0.03 % of the steps, and take 80 MB
 // A simulation of fewer trials than this is replaced by walks that do not end at a failure, with half of the steps that
 // the trials would have: an eighth of a quick study's time.
-constexpr std::size_t walk_count = 512;
 constexpr double least_counted_share = 0.5;
 // A pilot of one trial in sixteen, of 8 to 128, sees whether trials end within four times the expected steps: of 8, 7
 // at least do.
@@ -107,49 +105,9 @@ MeshEstimate around(double value, double relative) {
   return {value, value * std::exp(-relative), value * std::exp(relative)};
 }
 
-/// Says what trials to failure find alone where walks refute a mesh: "; ..." where enough fail within the steps
-/// allowed.
-/// @param walked  the step in which each walk failed, 0 if it walked on for `longest` steps
-std::string simulated_alone(const BatchMap& map, std::span<const double> start, const MeshStudyOptions& options,
-                            const std::vector<std::uint64_t>& walked, std::uint64_t longest) {
-  constexpr double enough_failed = 20, most = 4096;  // trials leave 1.6 % of their mean
-  constexpr std::uint64_t unforeseen = 2;            // times the steps that are foreseen from the walks
-  double failed = 0, steps = 0;
-  for (const std::uint64_t n : walked) {
-    failed += n > 0;
-    steps += static_cast<double>(n > 0 ? n : longest);
-  }
-  const double trials = failed < enough_failed ? 0 : static_cast<double>(options.simulated_steps) / (steps / failed);
-  if (trials < static_cast<double>(fewest_trials)) return "";
-  const std::optional<SimulatedSteps> alone =
-      simulate_steps(map, start,
-                     {.trials = static_cast<std::size_t>(std::min(trials, most)),
-                      .seed = options.seed,
-                      .threads = options.threads,
-                      .most_steps = unforeseen * options.simulated_steps});
-  if (!alone) return "";
-  const double half = normal_95 * alone->standard_error;
-  return fmt::format("; {} simulated trials fail after {:.4g} steps in the mean (95 % interval {:.4g} to {:.4g})",
-                     alone->trials, alone->mean, alone->mean - half, alone->mean + half);
-}
-
-/// Says what direct simulation finds where there is no mesh, and whether walks fail in it.
-std::pair<std::string, bool> walked_alone(const BatchMap& map, std::span<const double> start,
-                                          const MeshStudyOptions& options) {
-  const std::size_t walks = std::clamp<std::size_t>(options.simulated_steps, 2, walk_count);
-  const std::uint64_t longest = std::max<std::uint64_t>(1, options.simulated_steps / walks);
-  std::vector<std::uint64_t> walked =
-      follow_walks(map, start, longest, {.trials = walks, .seed = options.seed, .threads = options.threads});
-  const auto lasting = static_cast<std::size_t>(std::count(walked.begin(), walked.end(), 0U));
-  if (lasting == walks) return {fmt::format("none of {} simulated walks of {} steps fails", walks, longest), false};
-  if (lasting > 0)
-    return {fmt::format("{} of {} simulated walks fail within {} steps{}", walks - lasting, walks, longest,
-                        simulated_alone(map, start, options, walked, longest)),
-            true};
-  const SimulatedSteps all = summarize_steps(std::move(walked));
-  return {fmt::format("{} of {} simulated walks fail, after {:.4g} steps in the mean (standard error {:.2g})", walks,
-                      walks, all.mean, all.standard_error),
-          true};
+/// Returns the simulations of a study: of about `simulated_steps` steps.
+SimulationOptions walking(const MeshStudyOptions& options) {
+  return {.seed = options.seed, .threads = options.threads, .most_steps = options.simulated_steps};
 }
 
 /// Makes one study.
@@ -202,10 +160,10 @@ class Run {
     over(meshes_stage);
     foresee_other_ways(study_.steps.value, study_.mixing_steps);
     if (study_.steps.upper > widest * study_.steps.lower)
-      study_.disagreement =
-          fmt::format("the meshes do not converge ({:.4g} steps, {:.4g} to {:.4g}){}: no number is given",
-                      study_.steps.value, study_.steps.lower, study_.steps.upper,
-                      options_.simulated_steps > 0 ? "; " + walked_alone(map_, start_, options_).first : std::string());
+      study_.disagreement = fmt::format(
+          "the meshes do not converge ({:.4g} steps, {:.4g} to {:.4g}){}: no number is given", study_.steps.value,
+          study_.steps.lower, study_.steps.upper,
+          options_.simulated_steps > 0 ? "; " + walks_in_words(map_, start_, walking(options_)).first : std::string());
     if (study_.disagreement.empty()) simulate();
     over(simulation_stage);
     if (study_.disagreement.empty()) see_blind_spots();
@@ -438,7 +396,7 @@ class Run {
       study_.disagreement = fmt::format(
           "the mesh ({:.4g} steps, {:.4g} to {:.4g}) and direct simulation ({}) disagree: no number is given{}",
           study_.steps.value, study_.steps.lower, study_.steps.upper, count_text(*study_.walks),
-          simulated_alone(map_, start_, options_, walked, longest));
+          simulated_beside(map_, start_, walked, longest, walking(options_)));
   }
 
   void count(std::size_t walks, double longest) {
@@ -567,14 +525,14 @@ MeshStudy study_around(const BatchMap& map, std::span<const double> start, const
     return Run(map, start, options, std::move(orbit), period).run();
   } catch (const NoFailureFound& error) {
     if (options.simulated_steps == 0) throw;
-    const auto [found, fails] = walked_alone(map, start, options);
+    const auto [found, fails] = walks_in_words(map, start, walking(options));
     const std::string text = fmt::format("{}; {}", error.what(), found);
     if (fails) throw Disagreement(text + ": no number is given");
     throw NoFailureFound(text);
   } catch (const ConvergenceError& error) {
     if (options.simulated_steps == 0) throw;
     throw Disagreement(
-        fmt::format("{}; {}: no number is given", error.what(), walked_alone(map, start, options).first));
+        fmt::format("{}; {}: no number is given", error.what(), walks_in_words(map, start, walking(options)).first));
   }
 }
 
@@ -610,7 +568,7 @@ MeshStudy mesh_study(const BatchMap& map, std::span<const double> start, const M
     if (options.simulated_steps == 0) throw;
     std::string walked;
     try {
-      walked = walked_alone(map, start, options).first;
+      walked = walks_in_words(map, start, walking(options)).first;
     } catch (const MapError& broken) {  // a walk away from an unstable orbit may leave the finite numbers
       walked = fmt::format("simulated walks end: {}", broken.what());
     }

@@ -86,8 +86,9 @@ class Disagreement : public std::runtime_error {
   using std::runtime_error::runtime_error;
 };
 
-/// Where the start's noise-free orbit is unstable and leads to another gait, which may come back after several
-/// revolutions (periodic_gait), meshes lie around that one; steps are counted from the start all the same.
+/// Meshes lie around the start's noise-free orbit. An unstable one leads without noise to another gait, which may come
+/// back after several revolutions (periodic_gait): meshes lie around that one then, and steps are counted from the
+/// start all the same.
 ///
 /// Solves `sizes` meshes of `shifts` shifts each, extrapolates ln T to spacing 0 (h^2 and h^4, with four sizes h^6) for
 /// each shift by itself. The interval joins, as a root of squares, the t-interval over the shifts and the

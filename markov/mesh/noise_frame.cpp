@@ -177,7 +177,7 @@ std::optional<PeriodicGait> periodic_gait(const BatchMap& map, std::span<const d
       if (before.size() > static_cast<std::size_t>(longest_period)) before.pop_back();
       for (int phase = 0; phase < map.phases; ++phase) state = probe(phase, state, quiet, "without noise it fails");
       if (revolution <= least_revolutions) continue;
-      // On a way that alternates about the gait twice the period is near first: the shortest one that is near as well.
+      // A way that alternates about the gait is near itself after twice the period first: the shortest near one counts.
       if (const auto found = first_return(before, state, period_tolerance); found > 0)
         return PeriodicGait{first_return(before, state, same_state), {state.begin(), state.end()}};
     }

@@ -66,7 +66,8 @@ SplitVector refined(const Chain& chain, GeneratorSolver& solver, std::span<const
   return better;
 }
 
-/// What first_passage_sd() solves for, from split means, in units of the largest one.
+/// Returns by state the variance that the next step adds to the steps before failure, in units of the largest mean
+/// squared: first_passage_sd() sums it along the way.
 Row variance_of_a_step(const Chain& chain, const SplitVector& mean, Extended unit) {
   const auto square = [&](Extended off) { return off / unit * (off / unit); };
   Row variance(chain.size());

@@ -12,7 +12,7 @@
 
 namespace metastable::markov {
 
-/// What a proven bound of a number of this file has to reach, relative; wider ones are refused.
+/// The widest relative bound with which a number of this file is given; numbers with wider ones are refused.
 constexpr double widest_bound = 1e-6;
 
 /// Entry by entry, lower <= x <= upper.
@@ -52,8 +52,8 @@ struct BoundedQuasiStationary {
 /// Bounds the failure rate by a vector: (w - Q w) / w on the states where w > 0. Bounds that are there already stay
 /// where they are narrower.
 ///
-/// Of a reducible chain w is 0 on states that do not lead to those where it is above 0. What is proven then is the rate
-/// on the others: that of the class that was found to fade slowest, and not that no other class fades more slowly.
+/// The proof holds on the states where w is above 0. A reducible chain has others, which do not lead to those: its
+/// bounds are proven for the class that was found to fade slowest, and not that no other class fades more slowly.
 void enclose_rate(const Chain& chain, const SplitVector& weight, BoundedQuasiStationary& bounded);
 
 /// Finds the quasi-stationary distribution of any chain by leading_pair(), cyclic chains as a whole.

@@ -50,7 +50,7 @@ class Survivors {
   bool any_ = true;
 };
 
-/// What survivors in each cyclic class look like once settled.
+/// The settled distribution of survivors, cyclic class by cyclic class.
 class Settled {
  public:
   Settled(const Chain& chain, const QuasiStationary& quasi)

@@ -58,7 +58,7 @@ void add(Case& to, const std::string& effect, double times, Draws& draws) {
   Machine& m = to.machine;
   const int leg = draws.leg();
   const auto k = static_cast<std::size_t>(leg);
-  // Of large effects on friction those that raise it: with the others nearly all trials end at once.
+  // Large effects on friction raise it: nearly all trials would end at once with those that lower it.
   const double drawn = draws.sign(), signed_times = drawn * times, raising = times > 2 ? times : signed_times;
   std::string parameters;
   const auto said = [&](const char* name, double value) {

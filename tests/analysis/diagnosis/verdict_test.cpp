@@ -203,8 +203,8 @@ TEST(AtWork, IntervalsAreAsWideOnEitherSideAsTheirHypothesesSay) {
   EXPECT_GT(apart.upper, 2.5);
 }
 
-// What stays is 12 % of the gap at least: an effect that closes 1 to 3 % beside the others is doubted, one of 7 to 17 %
-// is not.
+// An effect that closes 1 to 3 % beside the others is doubted where 12 % of the gap stays at least; one that closes 7
+// to 17 % is not.
 TEST(LesserEffects, CloseClearlyLessThanWhatStays) {
   AtWork small, large, unknown;
   small.effects = {"slope_profile", "hub_eccentricity"};

@@ -102,7 +102,7 @@ TEST(MeshStudy, FollowsGaitsThatComeBackAfterTwoSteps) {
   }
 }
 
-// Beside an unstable start, 0, two gaits lie at 1 and -1: x' = 3/2 x - x^3 / 2, failed beyond -2 and 2.
+// Two gaits lie at 1 and -1 beside an unstable start, 0: x' = 3/2 x - x^3 / 2, failed beyond -2 and 2.
 TEST(MeshStudy, FollowsGaitsBesideAnUnstableStart) {
   BatchMap map;
   map.step = [](int, auto states, auto scores, auto next, auto failed) {
@@ -133,7 +133,7 @@ TEST(PeriodicGait, FindsThePeriodsOfLogisticMaps) {
     const auto gait = periodic_gait(logistic(r), std::vector<double>{1 - 1 / r});
     EXPECT_EQ(gait ? gait->period : 0, period) << r;
   }
-  // From 4 (1 + 1e-6) / 4 it leaves the unit interval, and the finite numbers after that.
+  // The map with r = 4 leaves the unit interval from right above 1, and the finite numbers after that.
   EXPECT_FALSE(periodic_gait(logistic(4), std::vector<double>{1}));
 }
 
