@@ -170,17 +170,11 @@ void complete_pairs(const RankingProblem& problem, EffectPairs& ranked, ScansBes
   for (const EffectTerm& term : best->terms) {
     const std::size_t leader = problem.index_of(term.candidate);
     if (!ranked.singles.causes[leader].fitted()) continue;
-    const EffectScan& scan = beside.of(ranked.singles, leader);
-    std::vector<double> promised;
-    for (const ScannedEffect& effect : scan.effects)
-      promised.push_back(evidence_of(effect, effect.gain[effect.best], problem.rules));
-    if (promised.empty()) continue;
-    const double most = *std::max_element(promised.begin(), promised.end());
-    for (std::size_t k = 0; k < promised.size(); ++k)
-      if (promised[k] > most - alike_margin && std::ranges::none_of(ranked.pairs, [&](const RankedCause& pair) {
-            return extends(pair.terms, {term, term_at(scan.effects[k], scan.effects[k].best)});
+    for (const ScannedEffect* effect : about_as_promising(problem, beside.of(ranked.singles, leader)))
+      if (std::ranges::none_of(ranked.pairs, [&](const RankedCause& pair) {
+            return extends(pair.terms, {term, term_at(*effect, effect->best)});
           }))
-        tries.push_back({leader, scan.effects[k]});
+        tries.push_back({leader, *effect});
   }
   fit_pairs(problem, ranked.singles, tries, ranked.pairs);
 }

@@ -137,16 +137,12 @@ void extend(const RankingProblem& problem, const SingleEffects& singles, const R
 std::vector<RankedCause> fit_alike_beside(const RankingProblem& problem, const SingleEffects& singles,
                                           const RankedCause& base, const std::vector<RankedCause>& known) {
   const EffectScan scan = scan_beside(problem, singles, base);
-  std::vector<double> promised;
-  for (const ScannedEffect& effect : scan.effects)
-    promised.push_back(evidence_of(effect, effect.gain[effect.best], problem.rules));
-  std::vector<const ScannedEffect*> tries;
-  for (std::size_t k = 0; k < promised.size(); ++k) {
-    if (promised[k] < std::ranges::max(promised) - alike_margin) continue;
+  std::vector<const ScannedEffect*> tries = about_as_promising(problem, scan);
+  std::erase_if(tries, [&](const ScannedEffect* effect) {
     std::vector<EffectTerm> terms = base.terms;
-    terms.push_back(term_at(scan.effects[k], scan.effects[k].best));
-    if (find_set(known, terms) == known.end()) tries.push_back(&scan.effects[k]);
-  }
+    terms.push_back(term_at(*effect, effect->best));
+    return find_set(known, terms) != known.end();
+  });
   std::vector<RankedCause> fitted(tries.size());
   markov::parallel_for(tries.size(), problem.threads, [&](std::size_t k) {
     problem.heartbeat();
@@ -183,6 +179,16 @@ void add_swaps(const RankingProblem& problem, const SingleEffects& singles, cons
 double log_prior_of_one_more(const RankingProblem& problem, std::size_t size) {
   const double k = static_cast<double>(size), others = static_cast<double>(problem.candidates.size()) - k + 1;
   return std::log(problem.rules.pair_prior / std::max(1.0, others / k));
+}
+
+std::vector<const ScannedEffect*> about_as_promising(const RankingProblem& problem, const EffectScan& scan) {
+  std::vector<double> promised;
+  for (const ScannedEffect& effect : scan.effects)
+    promised.push_back(evidence_of(effect, effect.gain[effect.best], problem.rules));
+  std::vector<const ScannedEffect*> all;
+  for (std::size_t k = 0; k < promised.size(); ++k)
+    if (promised[k] > std::ranges::max(promised) - alike_margin) all.push_back(&scan.effects[k]);
+  return all;
 }
 
 std::vector<ScannedEffect> promising_beside(const RankingProblem& problem, const EffectScan& scan,

@@ -13,6 +13,9 @@ namespace metastable::analysis {
 /// time.
 inline constexpr double alike_margin = 4;
 
+/// Lists the effects of a scan that promise about as much as the best one of it, to alike_margin.
+std::vector<const ScannedEffect*> about_as_promising(const RankingProblem& problem, const EffectScan& scan);
+
 /// Returns the log prior odds of a set of effects to the same without its last one, any of the others in its place.
 /// @param size  effects of the set, >= 2
 double log_prior_of_one_more(const RankingProblem& problem, std::size_t size);

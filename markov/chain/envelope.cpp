@@ -10,7 +10,8 @@ namespace {
 
 constexpr double most_multiply_adds = 1e10;  // of an elimination that is not thought twice about
 constexpr double filled = 0.6;               // of the square: above, all of it is stored
-// Measured: what iteration holds at its peak.
+// Estimates of what iteration holds at its peak: 0.42 GB for 1e5 states with 1e6 entries, of which the whole process
+// took 0.52 GB.
 constexpr double bytes_an_entry = 220, bytes_a_state = 2000;
 constexpr double work_an_entry = 2e4;  // of an iteration [multiply-adds]
 
