@@ -4,7 +4,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <limits>
 #include <optional>
 #include <set>
 #include <stdexcept>
@@ -232,11 +231,7 @@ void read_conditions(const std::string& file, Keys& root, Experiment& experiment
     if (wheel) {
       const Range slopes = dynamics::slope_range(experiment.wheel.legs());
       condition.slope_deg = keys.number("slope_deg", true, slopes).value_or(0);
-      const toml::node* ramp = keys.find("ramp_length_m", true);
-      if (ramp && ramp->value<double>() == std::numeric_limits<double>::infinity())
-        condition.ramp_length = std::numeric_limits<double>::infinity();
-      else
-        condition.ramp_length = keys.number("ramp_length_m", false, range::ramp_length).value_or(0);
+      condition.ramp_length = keys.number("ramp_length_m", true, range::ramp_length).value_or(0);
       condition.first_landing_leg =
           static_cast<int>(keys.whole("first_landing_leg", false, 0, experiment.wheel.legs() - 1).value_or(0));
       condition.day = static_cast<int>(keys.whole("day", false, 1, 1000).value_or(1));

@@ -59,11 +59,16 @@ void run_into_folder(const Request& request) {
   answer.finish(made.provenance);
 }
 
+// Refuses a ramp without end: experiment.toml states where the ramp ends.
+void require_end(const analysis::Setting& setting) {
+  if (std::isinf(setting.ramp_length))
+    throw std::invalid_argument("--ramp-length: inf: the ramp of an experiment ends; up to 100000 m do");
+}
+
 }  // namespace
 
 SimulatedExperiment simulated_experiment(const SimulateRequest& request, const BeginPart& begin) {
-  if (std::isinf(request.setting.ramp_length))  // experiment.toml states where the ramp ends
-    throw std::invalid_argument("--ramp-length: inf: the ramp of an experiment ends; up to 100000 m do");
+  require_end(request.setting);
   const std::vector<analysis::SimulatedCondition> conditions =
       request.stand_in ? analysis::stand_in(request.setting, request.seed, request.threads, begun(begin, "simulate"))
                        : std::vector<analysis::SimulatedCondition>{one_condition(request, begin)};
@@ -89,8 +94,10 @@ SimulatedExperiment simulated_experiment(const SimulateRequest& request, const B
 
 SimulatedExperiment simulated_experiment(const LaboratoryRequest& asked, const BeginPart& begin) {
   LaboratoryRequest request = asked;
-  for (analysis::LaboratoryCondition& condition : request.conditions)
+  for (analysis::LaboratoryCondition& condition : request.conditions) {
+    require_end(condition.setting);
     condition.setting = launched(condition.setting, request.reality.seed, request.reality.threads, begin);
+  }
   const dynamics::LaboratorySetup setup = analysis::laboratory_setup(request.conditions, request.reality);
   const std::vector<dynamics::LaboratoryTrial> trials =
       analysis::run_laboratory(setup, request.reality.threads, begun(begin, "simulate"));

@@ -59,7 +59,7 @@ def diagnosed(program, case, trials, seed, catalogue):
     with tempfile.TemporaryDirectory() as place:
         folder, answer = os.path.join(place, "wheel"), os.path.join(place, "answer.json")
         command = [program, "simulate", "--reality", "--law", case["law"], "--slope", case["slope_deg"], "--initial-speed",
-                   f"{case['launch_rad_s']:.6g},0.2", "--collisions", case["collisions"], "--ramp-length", "inf",
+                   f"{case['launch_rad_s']:.6g},0.2", "--collisions", case["collisions"], "--ramp-length", "1000",
                    "--restitution", "0.4,0.04", "--friction", "0.4,0.04", "--sensor-noise", 0.01, "--trials", trials,
                    "--seed", seed, "--threads", 1, "--out", folder]
         for one in case["effects"]:

@@ -2,12 +2,13 @@
 // Holds what several tests of reports/ share.
 
 #include <gtest/gtest.h>
-#include <unistd.h>
 
 #include <filesystem>
 #include <fstream>
 #include <iterator>
 #include <string>
+
+#include "tests/own_folder.h"
 
 namespace metastable::reports::test {
 
@@ -38,9 +39,6 @@ std::string printed(F f) {
 class InFolder : public testing::Test {
  protected:
   void SetUp() override {
-    const testing::TestInfo& test = *testing::UnitTest::GetInstance()->current_test_info();
-    folder_ = std::filesystem::temp_directory_path() / ("metastable_" + std::string(test.test_suite_name()) + "_" +
-                                                        test.name() + "_" + std::to_string(::getpid()));
     std::filesystem::remove_all(folder_);
     std::filesystem::create_directories(folder_);
   }
@@ -53,7 +51,7 @@ class InFolder : public testing::Test {
     return path(name);
   }
 
-  std::filesystem::path folder_;
+  const std::filesystem::path folder_ = metastable::test::own_folder();
 };
 
 }  // namespace metastable::reports::test

@@ -21,7 +21,7 @@ import numbers
 import operator
 import os
 import statistics
-from typing import Optional, Sequence, Tuple, Union
+from typing import Iterable, Optional, Sequence, Tuple, Union
 
 import numpy
 
@@ -648,6 +648,8 @@ class Walker:
         object.__setattr__(self, "start", _plain(numpy.atleast_1d(numpy.asarray(self.start, float))))
         object.__setattr__(self, "names", tuple(self.names))
         object.__setattr__(self, "noise_names", tuple(self.noise_names))
+        if isinstance(self.angles, str) or not isinstance(self.angles, Iterable):
+            raise TypeError(f"angles: names or places in a list expected, not {self.angles!r}")
         object.__setattr__(self, "angles", tuple(self._place(angle) for angle in self.angles))
         _metastable.check_map(_fields(self))
 
@@ -656,7 +658,10 @@ class Walker:
             if angle not in self.names:
                 raise InputError(f"angles: {angle!r} is none of the names {', '.join(self.names) or '(none are given)'}")
             return self.names.index(angle)
-        return operator.index(angle)
+        try:
+            return operator.index(angle)
+        except TypeError:
+            raise TypeError(f"angles: a name or a whole number expected, not {angle!r}") from None
 
     def study(self, **options):
         """study(self, ...)."""

@@ -2,7 +2,6 @@
 
 #include <fmt/format.h>
 #include <gtest/gtest.h>
-#include <unistd.h>
 
 #include <chrono>
 #include <filesystem>
@@ -13,6 +12,7 @@
 #include "analysis/experiment/experiment_folder.h"
 #include "analysis/experiment/input_error.h"
 #include "tests/analysis/settings.h"
+#include "tests/own_folder.h"
 
 namespace metastable::analysis {
 namespace {
@@ -275,18 +275,8 @@ TEST(Experiment, ReadsWhatSimulateWrites) {
   EXPECT_EQ(nominal_setting(e, 0).describe(), setting.describe());
 }
 
-// A ramp without end is written and read as such.
-TEST(Experiment, ReadsRampsWithoutEnd) {
-  const Experiment e =
-      parse_experiment(source(replaced(description, "3.66", "inf"), header + "a,1,1,0,5.0\na,1,2,1,5.1\n"));
-  EXPECT_TRUE(std::isinf(e.conditions[0].ramp_length));
-  EXPECT_EQ(e.conditions[1].ramp_length, 3);
-  EXPECT_EQ(defects(source(replaced(description, "3.66", "-inf"), header + "a,1,1,0,5.0\n")).size(), 1U);
-}
-
 TEST(Experiment, ReadsFoldersAndNamesTheFileThatIsMissing) {
-  const std::filesystem::path folder =
-      std::filesystem::temp_directory_path() / ("metastable_experiment_" + std::to_string(::getpid()));
+  const std::filesystem::path folder = metastable::test::own_folder();
   std::filesystem::create_directories(folder);
   const auto message = [&] {
     try {

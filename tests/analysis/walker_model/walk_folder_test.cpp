@@ -11,6 +11,7 @@
 
 #include "analysis/experiment/input_error.h"
 #include "tests/message_of.h"
+#include "tests/own_folder.h"
 
 namespace metastable::analysis::test {
 namespace {
@@ -19,7 +20,7 @@ namespace fs = std::filesystem;
 
 class WalkFolder : public ::testing::Test {
  protected:
-  WalkFolder() : folder_(fs::path(::testing::TempDir()) / fs::path("walk_folder_test")) {
+  WalkFolder() {
     fs::remove_all(folder_);
     fs::create_directories(folder_);
   }
@@ -35,7 +36,7 @@ class WalkFolder : public ::testing::Test {
     return message_of<InputError>([&] { read_walks(folder_); });
   }
 
-  fs::path folder_;
+  const fs::path folder_ = metastable::test::own_folder();
 };
 
 WalkFiles drawn(const std::vector<std::pair<std::string, double>>& effects = {}, std::size_t trials = 6,

@@ -9,6 +9,7 @@
 #include <memory>
 #include <stdexcept>
 
+#include "tests/own_folder.h"
 #include "tests/reports/support.h"
 
 namespace metastable::reports {
@@ -31,11 +32,15 @@ const std::vector<ManualCommand> manual{
 // Returns what bash itself makes of the script, for the words of a command line of which the last is to be completed.
 // Runs a script in a shell and returns the first line it prints.
 std::string first_line(const std::string& shell, const std::string& text) {
-  const std::filesystem::path script = std::filesystem::path(testing::TempDir()) / "metastable_completion";
+  const std::filesystem::path script = metastable::test::own_folder();
   std::ofstream(script) << text;
-  const std::unique_ptr<FILE, int (*)(FILE*)> pipe(::popen((shell + " " + script.string()).c_str(), "r"), ::pclose);
   std::array<char, 400> line{};
-  return std::fgets(line.data(), line.size(), pipe.get()) == nullptr ? "" : line.data();
+  {
+    const std::unique_ptr<FILE, int (*)(FILE*)> pipe(::popen((shell + " " + script.string()).c_str(), "r"), ::pclose);
+    if (std::fgets(line.data(), line.size(), pipe.get()) == nullptr) line[0] = 0;
+  }
+  std::filesystem::remove(script);
+  return line.data();
 }
 
 std::string completed(const std::string& words, int last) {

@@ -67,6 +67,8 @@ TEST_F(Refusals, OfOptionsThatDoNothing) {
        "--out: a sweep keeps its points in a file as they come; --json - prints them"},
       {{"simulate", "--ramp-length", "inf", "--out", path("endless")},
        "--ramp-length: inf: the ramp of an experiment ends; up to 100000 m do"},
+      {{"simulate", "--reality", "--ramp-length", "inf", "--out", path("endless")},
+       "--ramp-length: inf: the ramp of an experiment ends; up to 100000 m do"},
       {{"steps", "--json", ""}, "--json: what is given is empty"},
       {{"effects", "--json", ""}, "--json: what is given is empty"},
       {{"diagnose", ""}, "DIR: what is given is empty"},

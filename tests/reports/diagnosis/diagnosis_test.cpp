@@ -20,6 +20,7 @@
 #include "reports/diagnosis/diagnosis_text.h"
 #include "reports/experiment_commands/diagnose_command.h"
 #include "reports/output/text_table.h"
+#include "tests/own_folder.h"
 
 namespace metastable::reports {
 namespace {
@@ -176,35 +177,36 @@ TEST(DiagnosisText, SaysTheVerdictFirstAndAnswersEveryQuestion) {
   const std::string text = diagnosis_text(sample(), 400);
   EXPECT_EQ(text.find("verdict: explained\nOne cause explains it: leg_contact.\n"), 0U);
   std::size_t last = 0;
-  for (const char* part : {"Next: Tell the causes apart before changing the model: slopes flatter by 2 deg would do it best",
-                           "Is there a gap?",
-                           "Where it lies",
-                           "leg 3, collision",
-                           "Which effect",
-                           "leg 3, friction_ratio 1.6 (1.4 to 1.9)",
-                           "none of these",
-                           "How far it shrinks",
-                           "95 % (88 to 100)",
-                           "not known: the gap as given may be none",
-                           "Expected steps before failure",
-                           "infinite",
-                           "at least 1300",
-                           "on a slope of 8 deg",
-                           "120 (80 to 170)",
-                           "What these data could have seen",
-                           "70 % like leg_lengths",
-                           "no noise is stated",
-                           "What missing columns hide",
-                           "friction_patch",
-                           "no effect is much harder to see",
-                           "Not decided",
-                           "the fit did not converge",
-                           "What these data cannot say",
-                           "where the gap lies",
-                           "The next experiment",
-                           "slopes flatter by 2 deg",
-                           "Data",
-                           "The noise was taken"}) {
+  for (const char* part :
+       {"Next: Tell the causes apart before changing the model: slopes flatter by 2 deg would do it best",
+        "Is there a gap?",
+        "Where it lies",
+        "leg 3, collision",
+        "Which effect",
+        "leg 3, friction_ratio 1.6 (1.4 to 1.9)",
+        "none of these",
+        "How far it shrinks",
+        "95 % (88 to 100)",
+        "not known: the gap as given may be none",
+        "Expected steps before failure",
+        "infinite",
+        "at least 1300",
+        "on a slope of 8 deg",
+        "120 (80 to 170)",
+        "What these data could have seen",
+        "70 % like leg_lengths",
+        "no noise is stated",
+        "What missing columns hide",
+        "friction_patch",
+        "no effect is much harder to see",
+        "Not decided",
+        "the fit did not converge",
+        "What these data cannot say",
+        "where the gap lies",
+        "The next experiment",
+        "slopes flatter by 2 deg",
+        "Data",
+        "The noise was taken"}) {
     const std::size_t at = text.find(part, last);
     EXPECT_NE(at, std::string::npos) << part << "\n" << text;
     if (at != std::string::npos) last = at;
@@ -315,7 +317,7 @@ TEST(DiagnosisFigures, FirstMapHoldsThePlacesThatTellAlone) {
 }
 
 TEST(DiagnosisPage, HoldsFiguresAndTablesAndLoadsNothing) {
-  const std::filesystem::path folder = std::filesystem::path(testing::TempDir()) / "diagnosis-page";
+  const std::filesystem::path folder = metastable::test::own_folder();
   std::filesystem::remove_all(folder);
   write_diagnosis(sample(), "Wheel <1>", "coulomb", provenance, folder.string());
   std::ifstream in(folder / "index.html");

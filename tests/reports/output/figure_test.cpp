@@ -14,6 +14,7 @@
 
 #include "reports/output/interrupt.h"
 #include "tests/message_of.h"
+#include "tests/own_folder.h"
 
 namespace metastable::reports {
 namespace {
@@ -209,7 +210,7 @@ class HangingGnuplot : public ::testing::Test {
   }
 
   const std::string path = std::getenv("PATH");
-  const std::filesystem::path folder = std::filesystem::path(::testing::TempDir()) / "hanging-gnuplot";
+  const std::filesystem::path folder = metastable::test::own_folder();
 };
 
 TEST_F(HangingGnuplot, IsEndedAtTheLimit) {

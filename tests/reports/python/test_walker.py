@@ -128,6 +128,9 @@ class Steps(unittest.TestCase):
         for angles, sentence in ((["x"], "angles: 'x' is none of the names angle"), ([1], r"angles: 1 is outside 0\.\.0")):
             with self.assertRaisesRegex(metastable.InputError, sentence):
                 metastable.walker(turned, 1, 1, start=[np.pi], names=["angle [rad]"], angles=angles)
+        for angles, sentence in ((5, "names or places in a list expected, not 5"), ([0.5], "a name or a whole number")):
+            with self.assertRaisesRegex(TypeError, "angles: " + sentence):
+                metastable.walker(turned, 1, 1, start=[np.pi], angles=angles)
 
     def test_of_six_dimensions_are_split(self):
         kept = np.linspace(0.3, 0.8, 6)
