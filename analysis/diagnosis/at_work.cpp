@@ -9,6 +9,7 @@
 
 #include "analysis/diagnosis/diagnosis_sentences.h"
 #include "analysis/fitting/cause_ranking.h"
+#include "analysis/fitting/effect_fit.h"
 #include "analysis/gap/held_out.h"
 #include "analysis/statistics/interval_95.h"
 
@@ -150,11 +151,12 @@ void add_closed_shares(std::vector<AtWork>& at_work, const TransitionModel& mode
   struct Asked {
     AtWork* whose;
     std::size_t alone;
-    std::optional<std::size_t> beside;
+    std::size_t beside;
   };
   std::vector<GapPart> parts;
   std::vector<Asked> asked;
   std::deque<Fit> alone;  // the effect in the model as given
+  std::deque<Fit> rest;   // sets without one effect that the search did not fit
   for (AtWork& one : at_work) {
     const auto own = std::ranges::find_if(best.fit.terms, [&](const EffectTerm& term) {
       return std::ranges::find(one.effects, term.candidate->id) != one.effects.end();
@@ -164,23 +166,26 @@ void add_closed_shares(std::vector<AtWork>& at_work, const TransitionModel& mode
     alone.back().nuisance = given.nuisance;
     alone.back().terms = {*own};
     alone.back().converged = false;  // it is a start, not a fit
-    asked.push_back({&one, parts.size(), {}});
+    asked.push_back({&one, parts.size(), parts.size() + 1});
     parts.push_back({&alone.back(), &given, false});
     std::vector<EffectTerm> others = best.fit.terms;
     std::erase_if(others, [&](const EffectTerm& term) { return term.candidate == own->candidate; });
-    if (const Fit* without = fit_of(others)) {
-      asked.back().beside = parts.size();
-      parts.push_back({&best.fit, without, true});
+    const Fit* without = fit_of(others);
+    if (!without) {
+      if (heartbeat) heartbeat();
+      without = &rest.emplace_back(fit(
+          model, best.fit.nuisance, others,
+          {.count = {}, .refit_nuisances = true, .most_iterations = effort_for(model, recalibrated).most_iterations}));
     }
+    parts.push_back({&best.fit, without, true});
   }
   if (parts.empty()) return;
   const std::vector<ClosedShare> closed =
       parts_closed(model, recalibrated, gap, parts, options.folds, options.threads, options.seed, heartbeat);
   for (const Asked& one : asked) {
     one.whose->closes_alone = closed[one.alone].estimate();
-    if (!one.beside) continue;
-    one.whose->closes_beside = closed[*one.beside].estimate();
-    one.whose->closes_mean = mean_of(closed[one.alone], closed[*one.beside]).estimate();
+    one.whose->closes_beside = closed[one.beside].estimate();
+    one.whose->closes_mean = mean_of(closed[one.alone], closed[one.beside]).estimate();
   }
 }
 

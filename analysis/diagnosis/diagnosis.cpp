@@ -6,6 +6,7 @@
 #include <cmath>
 #include <iterator>
 #include <optional>
+#include <set>
 #include <stdexcept>
 #include <tuple>
 #include <utility>
@@ -397,11 +398,15 @@ Decided decide(const TransitionModel& model, const Fitted& fitted, const std::ve
   return decided;
 }
 
-// Doubts effects that are lesser than what stays without a name.
-void doubt_lesser_effects(Diagnosis& d) {
-  const std::optional<double> closed_upper = d.shrinkage.measures.front().closed_upper;
-  if (!closed_upper) return;
-  const std::map<std::string, double> doubted = lesser_effects(d.causes.at_work, 1 - *closed_upper);
+// Doubts effects that may only take the shape of what stays without a name.
+void doubt_effects(Diagnosis& d, const std::vector<const Candidate*>& candidates) {
+  const Shrinkage& shrinkage = d.shrinkage.measures.front();
+  if (!shrinkage.closed_upper) return;
+  std::set<std::string> exact;
+  for (const Candidate* candidate : candidates)
+    if (candidate->exact) exact.insert(candidate->id);
+  const std::map<std::string, double> doubted =
+      doubted_effects(d.causes.at_work, {1 - *shrinkage.closed_upper, shrinkage.with_effect_lower}, exact);
   if (doubted.empty()) return;
   Named named = corrected({d.verdict, d.causes.set, d.causes.alike, d.causes.at_work, d.causes.p_unnamed}, doubted,
                           d.causes.p_unnamed, d.causes.ranked, d.rules);
@@ -422,7 +427,7 @@ Diagnosis answer(const TransitionModel& model, const Fitted& fitted, const std::
   if (best && !d.shrinkage.measures.empty() && d.shrinkage.measures.front().closed) {
     add_closed_shares(d.causes.at_work, model, fitted.ranking, *best, fitted.given, fitted.recalibrated,
                       decided.held_out.gap, options, [&] { progress(0.86, "what each effect closes"); });
-    if (d.verdict == Verdict::partly_explained) doubt_lesser_effects(d);
+    if (d.verdict == Verdict::partly_explained) doubt_effects(d, candidates);
   }
 
   progress(0.88, "steps before failure");

@@ -270,12 +270,18 @@ Named give_verdict(const Probabilities& probabilities, const Odds& unnamed, cons
   return named;
 }
 
-std::map<std::string, double> lesser_effects(const std::vector<AtWork>& at_work, double left_lower) {
-  std::map<std::string, double> lesser;
-  for (const AtWork& one : at_work)
-    if (one.closes_beside && one.closes_beside->upper < left_lower)
-      for (const std::string& effect : one.effects) lesser[effect] = 1 / (1 + Rules::even_odds);
-  return lesser;
+std::map<std::string, double> doubted_effects(const std::vector<AtWork>& at_work, const Stays& stays,
+                                              const std::set<std::string>& exact) {
+  std::map<std::string, double> doubted;
+  for (const AtWork& one : at_work) {
+    if (!one.closes_alone || !one.closes_beside) continue;
+    const bool lesser = one.closes_beside->upper < stays.share;
+    const bool part_of_a_shape = one.closes_alone->lower <= 0 && one.closes_alone->upper < one.closes_beside->lower;
+    for (const std::string& effect : one.effects)
+      if (lesser || (stays.nats > 0 && (part_of_a_shape || exact.contains(effect))))
+        doubted[effect] = 1 / (1 + Rules::even_odds);
+  }
+  return doubted;
 }
 
 Named corrected(Named named, const std::map<std::string, double>& beside, double unnamed,

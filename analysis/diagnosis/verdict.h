@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cstddef>
 #include <map>
+#include <set>
 #include <string>
 #include <vector>
 
@@ -96,10 +97,19 @@ Named give_verdict(const Probabilities& probabilities, const Odds& unnamed, cons
                    const std::vector<Detectability>& visible, const Diagnosis::Data& data,
                    const std::string& recalibration_id, const Rules& rules);
 
-/// Lists effects that, added last, clearly close less than what stays without a name, with even odds of being at work:
-/// what takes that shape may take theirs as well.
-/// @param left_lower  lower end of the share of the gap that stays
-std::map<std::string, double> lesser_effects(const std::vector<AtWork>& at_work, double left_lower);
+/// What stays of the gap beside the effects at work, at the lower ends of its 90 % intervals.
+struct Stays {
+  double share = 0;  ///< of the held-out gap as given
+  double nats = 0;   ///< a collision, held out
+};
+
+/// Lists effects that may only take the shape of what stays without a name, with even odds of being at work: those that,
+/// added last, clearly close less than what stays; and, where something surely stays (nats > 0), those that close
+/// nothing alone and clearly more beside the others, as parts do that make up a shape together, and those that have no
+/// other form (Candidate::exact), since no misfit in form is forgiven them.
+/// @param exact  ids
+std::map<std::string, double> doubted_effects(const std::vector<AtWork>& at_work, const Stays& stays,
+                                              const std::set<std::string>& exact);
 
 /// Corrects the probabilities of a partly explained gap by what each effect gains beside the unnamed: an effect that
 /// only takes its shape is not at work, and where none is left the gap is unexplained.
