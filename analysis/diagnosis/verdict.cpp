@@ -274,12 +274,9 @@ std::map<std::string, double> doubted_effects(const std::vector<AtWork>& at_work
                                               const std::set<std::string>& exact) {
   std::map<std::string, double> doubted;
   for (const AtWork& one : at_work) {
-    if (!one.closes_alone || !one.closes_beside) continue;
-    const bool lesser = one.closes_beside->upper < stays.share;
-    const bool part_of_a_shape = one.closes_alone->lower <= 0 && one.closes_alone->upper < one.closes_beside->lower;
+    const bool lesser = one.closes_beside && one.closes_beside->upper < stays.share;
     for (const std::string& effect : one.effects)
-      if (lesser || (stays.nats > 0 && (part_of_a_shape || exact.contains(effect))))
-        doubted[effect] = 1 / (1 + Rules::even_odds);
+      if (lesser || (stays.nats > 0 && exact.contains(effect))) doubted[effect] = 1 / (1 + Rules::even_odds);
   }
   return doubted;
 }

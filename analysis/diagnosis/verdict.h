@@ -103,10 +103,9 @@ struct Stays {
   double nats = 0;   ///< a collision, held out
 };
 
-/// Lists effects that may only take the shape of what stays without a name, with even odds of being at work: those that,
-/// added last, clearly close less than what stays; and, where something surely stays (nats > 0), those that close
-/// nothing alone and clearly more beside the others, as parts do that make up a shape together, and those that have no
-/// other form (Candidate::exact), since no misfit in form is forgiven them.
+/// Lists effects that may only take the shape of what stays without a name, with even odds of being at work: those
+/// that, added last, clearly close less than what stays; and, where something surely stays (nats > 0), those that have
+/// no other form (Candidate::exact), since no misfit in form is forgiven them.
 /// @param exact  ids
 std::map<std::string, double> doubted_effects(const std::vector<AtWork>& at_work, const Stays& stays,
                                               const std::set<std::string>& exact);

@@ -203,10 +203,9 @@ TEST(AtWork, IntervalsAreAsWideOnEitherSideAsTheirHypothesesSay) {
   EXPECT_GT(apart.upper, 2.5);
 }
 
-AtWork closing(std::vector<std::string> effects, const Estimate& alone, const Estimate& beside) {
+AtWork closing(std::vector<std::string> effects, const Estimate& beside) {
   AtWork one;
   one.effects = std::move(effects);
-  one.closes_alone = alone;
   one.closes_beside = beside;
   return one;
 }
@@ -217,25 +216,15 @@ TEST(DoubtedEffects, CloseClearlyLessThanWhatStays) {
   AtWork unknown;
   unknown.effects = {"bounce"};
   const std::map<std::string, double> doubted =
-      doubted_effects({closing({"slope_profile", "hub_eccentricity"}, {0.02, 0.01, 0.03}, {0.02, 0.01, 0.03}),
-                       closing({"leg_contact"}, {0.12, 0.07, 0.17}, {0.12, 0.07, 0.17}), unknown},
+      doubted_effects({closing({"slope_profile", "hub_eccentricity"}, {0.02, 0.01, 0.03}),
+                       closing({"leg_contact"}, {0.12, 0.07, 0.17}), unknown},
                       {0.12, 0}, {});
   EXPECT_EQ(doubted, (std::map<std::string, double>{{"slope_profile", 0.5}, {"hub_eccentricity", 0.5}}));
 }
 
-// Where something surely stays, what closes nothing alone and 14 to 34 % beside the others is a part of a shape; what
-// closes 5 to 29 % beside them may close as much as alone.
-TEST(DoubtedEffects, CloseNothingAloneAndMuchBesideOthers) {
-  const std::vector<AtWork> at_work = {closing({"contact_memory"}, {-0.005, -0.03, 0.02}, {0.24, 0.14, 0.34}),
-                                       closing({"trial_drift"}, {0, -0.05, 0.06}, {0.17, 0.05, 0.29}),
-                                       closing({"bounce"}, {0.04, 0.02, 0.06}, {0.3, 0.2, 0.4})};
-  EXPECT_EQ(doubted_effects(at_work, {0.02, 0.01}, {}), (std::map<std::string, double>{{"contact_memory", 0.5}}));
-  EXPECT_TRUE(doubted_effects(at_work, {0.02, -0.01}, {}).empty());
-}
-
 // A noise without another form is doubted where something surely stays, and only there.
 TEST(DoubtedEffects, HaveNoOtherForm) {
-  const std::vector<AtWork> at_work = {closing({"sensor_noise"}, {0.99, 0.98, 1}, {0.7, 0.66, 0.74})};
+  const std::vector<AtWork> at_work = {closing({"sensor_noise"}, {0.7, 0.66, 0.74})};
   EXPECT_TRUE(doubted_effects(at_work, {0, -0.01}, {"sensor_noise"}).empty());
   EXPECT_TRUE(doubted_effects(at_work, {0, 0.01}, {"slope_offset"}).empty());
   EXPECT_EQ(doubted_effects(at_work, {0, 0.01}, {"sensor_noise"}).at("sensor_noise"), 0.5);
