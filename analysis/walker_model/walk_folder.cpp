@@ -11,6 +11,7 @@
 #include <stdexcept>
 
 #include "analysis/experiment/csv_reader.h"
+#include "analysis/experiment/experiment_folder.h"
 #include "analysis/experiment/experiment_toml.h"
 #include "analysis/experiment/suggestion.h"
 #include "analysis/machine_model/machine_transitions.h"
@@ -81,8 +82,9 @@ class WalkReader {
     row.position = position.value_or(std::nan(""));
     row.phase = phase ? static_cast<int>(*phase) - 1 : -1;
     if (!machine_.inputs.empty()) {
-      if (!phase) return csv.refuse(phase_, "is missing: which leg stands, 1 or 2, is given in every row or in none");
-      row.inputs = {static_cast<double>(*phase)};
+      if (csv.text(phase_).empty())
+        csv.refuse(phase_, "is missing: which leg stands, 1 or 2, is given in every row or in none");
+      row.inputs = {static_cast<double>(phase.value_or(1))};
     }
     place(csv, {condition_of(csv), *trial}, *step, std::move(row));
   }
@@ -206,18 +208,22 @@ std::vector<double> values_with(const Machine& machine, const std::vector<std::p
 
 }  // namespace
 
+bool states_walks(const std::string& experiment_toml) {
+  Defects defects;
+  return parse_walk_toml("", experiment_toml, defects).has_value();
+}
+
 bool holds_walks(const std::filesystem::path& folder) {
   try {
-    const ExperimentSource source = read_source(folder);
-    Defects defects;
-    return parse_walk_toml(source.folder, source.experiment_toml, defects).has_value();
+    return states_walks(read_source(folder).experiment_toml);
   } catch (const InputError&) {
     return false;
   }
 }
 
-std::optional<Walks> read_walks(const std::filesystem::path& folder) {
-  const ExperimentSource source = read_source(folder);
+std::optional<Walks> read_walks(const std::filesystem::path& folder) { return parse_walks(read_source(folder)); }
+
+std::optional<Walks> parse_walks(const ExperimentSource& source) {
   Defects defects;
   const auto told = parse_walk_toml(file_in(source, "experiment.toml"), source.experiment_toml, defects);
   if (!told && !(source.steps_csv && !source.collisions_csv)) return std::nullopt;
@@ -257,6 +263,22 @@ Diagnosis diagnose_walks(const Walks& walks, const DiagnosisOptions& options) {
   return diagnose(std::move(model), options);
 }
 
+std::string walk_description(const WalkerSetting& setting, const std::vector<MeasuredState>& measured,
+                             const std::string& title, const std::vector<std::string>& comment) {
+  std::string toml;
+  for (const std::string& line : comment) toml += "# " + line + "\n";
+  toml += fmt::format(
+      "title = {}\nsystem = \"machine\"\n\n[machine]\nmodel = \"{}\"\n\n[machine.parameters]   # nominal value, and "
+      "the "
+      "sd with which it is known\nslope_deg = {{ mean = {}, sd = {} }}\nslope_sd_deg = {{ mean = {}, sd = {} }}\n\n"
+      "[columns]              # sd of the error of a measured value\n",
+      toml_text(title), walker_name(setting.walker), setting.slope_deg, WalkerStatement{}.slope_known_deg,
+      setting.slope_sd_deg, setting.slope_sd_deg);
+  for (const MeasuredState& one : measured)
+    toml += one.sd ? fmt::format("{} = {{ sd = {} }}\n", one.state, *one.sd) : fmt::format("{} = {{}}\n", one.state);
+  return toml;
+}
+
 WalkFiles draw_walks(const WalkerSetting& setting, const std::vector<std::pair<std::string, double>>& effects,
                      const WalkOptions& options, const std::string& title) {
   WalkerStatement statement;
@@ -267,19 +289,13 @@ WalkFiles draw_walks(const WalkerSetting& setting, const std::vector<std::pair<s
   const std::vector<double> start =
       gait_state(setting, dynamics::find_gait(setting.map().walker(), setting.slope_deg * degree));
   WalkFiles files;
-  files.experiment_toml = fmt::format(
-      "title = \"{}\"\nsystem = \"machine\"\n\n[machine]\nmodel = \"{}\"\n\n[machine.parameters]   # nominal value, "
-      "and the "
-      "sd with which it is known\nslope_deg = {{ mean = {}, sd = {} }}\nslope_sd_deg = {{ mean = {}, sd = {} }}\n\n"
-      "[columns]              # sd of the error of a measured value\n",
-      title, walker_name(setting.walker), setting.slope_deg, statement.slope_known_deg, setting.slope_sd_deg,
-      setting.slope_sd_deg);
   files.steps_csv = "trial,step,phase";
+  std::vector<MeasuredState> measured;
   for (const std::string& state : machine.states) {
     files.steps_csv += "," + state;
-    files.experiment_toml +=
-        fmt::format("{} = {{ sd = {} }}\n", state, state == "half_angle_rad" ? angle_error : rate_error);
+    measured.push_back({state, state == "half_angle_rad" ? angle_error : rate_error});
   }
+  files.experiment_toml = walk_description(setting, measured, title);
   files.steps_csv += "\n";
   files.trials_csv = "trial,outcome\n";
   WalkDrawer drawer(machine, values_with(machine, effects), options, rate_error);

@@ -26,15 +26,30 @@ struct Walks {
 /// Says whether a folder's experiment.toml states `system = "machine"`; false where it cannot be read.
 bool holds_walks(const std::filesystem::path& folder);
 
+/// Says whether the text of an experiment.toml states it.
+bool states_walks(const std::string& experiment_toml);
+
 /// Reads a folder whose experiment.toml states `system = "machine"`; nothing where it states another.
 /// Checks names, types and ranges of keys and columns, steps of a trial in order without gap, trials that stand
 /// together, and outcomes of those trials only.
 /// @throws InputError with the first 20 defects, each with file, line and column
 std::optional<Walks> read_walks(const std::filesystem::path& folder);
+/// Reads it from the texts of its files.
+std::optional<Walks> parse_walks(const ExperimentSource& source);
 
 /// @throws as machine_transitions() and diagnose(); std::invalid_argument for another slope or speed, which
 ///   walks do not have, and for an effect of the catalogue that this machine does not know
 Diagnosis diagnose_walks(const Walks& walks, const DiagnosisOptions& options);
+
+/// A state that was measured.
+struct MeasuredState {
+  std::string state;         ///< its column
+  std::optional<double> sd;  ///< of a value's error; nothing: to be fitted
+};
+
+/// Writes experiment.toml of walks. @param comment  its lines come first, each behind "# "
+std::string walk_description(const WalkerSetting& setting, const std::vector<MeasuredState>& measured,
+                             const std::string& title, const std::vector<std::string>& comment = {});
 
 /// Holds the three files as text.
 struct WalkFiles {

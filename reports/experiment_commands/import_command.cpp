@@ -31,6 +31,10 @@ struct ForeignFile {
   std::vector<std::string> found = {};  // of its layout, a sentence each
 };
 
+std::vector<MappedColumn> mapped(const ImportRequest& request, const std::vector<std::string>& names) {
+  return map_columns(request.columns, names, request.file, request.collisions_from, request.subject);
+}
+
 ForeignFile read_csv(const ImportRequest& request, const std::string& text) {
   if (request.orientation != TrialsIn::not_told)
     throw std::invalid_argument("--trials-in: has a meaning for matrices of a MAT file only");
@@ -39,8 +43,7 @@ ForeignFile read_csv(const ImportRequest& request, const std::string& text) {
   auto [form, found] = csv_form(text, request.form, [&](const std::vector<std::string>& names) {
     try {
       if (!request.columns.empty()) return names_all(request.columns, names, request.collisions_from);
-      const std::vector<MappedColumn> map = map_columns(request.columns, names, request.file, request.collisions_from);
-      return column_of(map, Role::omega_minus) != nullptr || column_of(map, Role::angle) != nullptr;
+      return main_column(mapped(request, names)) != nullptr;
     } catch (const std::invalid_argument&) {
       return false;
     }
@@ -52,11 +55,10 @@ ForeignFile read_csv(const ImportRequest& request, const std::string& text) {
       if (separator != *request.form.separator && file.names.front().find(separator) != std::string::npos)
         throw std::invalid_argument(
             fmt::format("{}:1: one column, which holds a {}; say --separator {}", request.file, name, name));
-  if (!file.names.empty()) file.map = map_columns(request.columns, file.names, request.file, request.collisions_from);
-  if (!file.names.empty() && column_of(file.map, Role::omega_minus) == nullptr &&
-      column_of(file.map, Role::angle) == nullptr)
-    throw std::invalid_argument(fmt::format("--columns: which column of {} is omega_minus (or angle)? It has {}",
-                                            request.file, fmt::join(file.names, ", ")));
+  if (!file.names.empty()) file.map = mapped(request, file.names);
+  if (!file.names.empty() && main_column(file.map) == nullptr)
+    throw std::invalid_argument(fmt::format("--columns: which column of {} is {}? It has {}", request.file,
+                                            main_name(request.subject), fmt::join(file.names, ", ")));
   file.rows = csv_rows(request.file, text, form, file.map, request.collisions_from, defects);
   defects.check();
   return file;
@@ -68,7 +70,8 @@ ForeignFile read_foreign(const ImportRequest& request) {
   if (request.form.separator || request.form.decimal || request.form.skip_rows || request.form.units_row)
     throw std::invalid_argument(fmt::format(
         "{}: is a MAT file; --separator, --decimal, --skip-rows and --units-row are for a CSV", request.file));
-  MatRows read = mat_rows(request.file, text, request.columns, request.orientation, request.collisions_from);
+  MatRows read =
+      mat_rows(request.file, text, request.columns, request.orientation, request.collisions_from, request.subject);
   return {std::move(read.rows), std::move(read.map), std::move(read.names), std::move(read.found)};
 }
 
@@ -89,6 +92,17 @@ std::string description_of(const ImportRequest& request, const std::vector<Impor
     for (const std::string& line : comment) text += "# " + line + "\n";
     return text + read_file(request.description);
   }
+  if (request.walker) {
+    std::vector<analysis::MeasuredState> measured;
+    for (const Role role : {Role::half_angle, Role::stance_rate, Role::swing_rate}) {
+      if (std::ranges::none_of(rows, [&](const ImportedRow& row) { return (row.*value_member(role)).has_value(); }))
+        continue;
+      const auto error = std::ranges::find(request.errors, role, &std::pair<Role, double>::first);
+      measured.push_back({std::string(column_in_folder(role)),
+                          error == request.errors.end() ? std::nullopt : std::optional(error->second)});
+    }
+    return analysis::walk_description(*request.walker, measured, request.title, comment);
+  }
   std::vector<std::pair<std::string, double>> slopes = request.slopes;
   if (slopes.empty()) {
     for (const ImportedRow& row : rows)
@@ -108,21 +122,6 @@ std::string description_of(const ImportRequest& request, const std::vector<Impor
   return toml;
 }
 
-struct Counted {
-  std::string id;
-  std::size_t trials = 0, collisions = 0;
-};
-
-std::vector<Counted> counted(const analysis::Experiment& experiment) {
-  std::vector<Counted> conditions;
-  for (const analysis::Condition& condition : experiment.conditions) conditions.push_back({condition.id});
-  for (const analysis::MeasuredTrial& trial : experiment.trials) {
-    ++conditions[trial.condition].trials;
-    conditions[trial.condition].collisions += trial.collisions.size();
-  }
-  return conditions;
-}
-
 std::vector<std::string> unused(const ForeignFile& file) {
   std::vector<std::string> names;
   for (std::size_t i = 0; i < file.names.size(); ++i)
@@ -137,24 +136,26 @@ std::vector<std::string> unused(const ForeignFile& file) {
 std::string import_json(const ImportRequest& request, const ForeignFile& file, const Imported& imported,
                         const Provenance& provenance) {
   nlohmann::ordered_json json = {{"folder", request.out}, {"trials", imported.trials}, {"rows", imported.rows}};
-  for (const Counted& c : counted(imported.experiment))
-    json["conditions"].push_back({{"id", c.id}, {"trials", c.trials}, {"collisions", c.collisions}});
+  const char* const rows = request.subject == Subject::walks ? "steps" : "collisions";
+  for (const Imported::Counted& c : imported.conditions)
+    json["conditions"].push_back({{"id", c.id}, {"trials", c.trials}, {rows, imported.source.angle_csv ? 0 : c.rows}});
   for (const MappedColumn& column : file.map)
     json["columns"][std::string(role_name(column.role))] = {{"name", column.name}, {"unit", column.unit}};
   json["unused"] = unused(file);
   json["found"] = file.found;
   json["assumed"] = imported.assumed;
-  json["notes"] = imported.experiment.notes;
+  json["notes"] = imported.notes;
   json["provenance"] = provenance_lines(provenance);
   return json.dump(2) + "\n";
 }
 
 void print_import(const ImportRequest& request, const ForeignFile& file, const Imported& imported) {
   const bool angles = imported.source.angle_csv.has_value();
-  say("{}: {} trials, {} {}\n", request.out, imported.trials, imported.rows, angles ? "frames" : "collisions");
-  if (!angles && imported.experiment.conditions.size() > 1)
-    for (const Counted& c : counted(imported.experiment))
-      say("  {}: {} trials, {} collisions\n", c.id, c.trials, c.collisions);
+  const char* const what = request.subject == Subject::walks ? "steps" : angles ? "frames" : "collisions";
+  say("{}: {} trials, {} {}\n", request.out, imported.trials, imported.rows, what);
+  if (!angles && imported.conditions.size() > 1)
+    for (const Imported::Counted& c : imported.conditions)
+      say("  {}: {} trials, {} {}\n", c.id, c.trials, c.rows, what);
   for (const MappedColumn& column : file.map)
     say("  {:<12} {}{}\n", role_name(column.role), column.name,
         column.unit.empty() ? "" : fmt::format(" in {}", column.unit));
@@ -162,7 +163,7 @@ void print_import(const ImportRequest& request, const ForeignFile& file, const I
   for (const std::string& sentence : imported.assumed) say("assumed: {}\n", sentence);
   if (const std::vector<std::string> names = unused(file); !names.empty())
     say("not used: {}\n", fmt::join(names, ", "));
-  for (const std::string& note : imported.experiment.notes) say("note: {}\n", note);
+  for (const std::string& note : imported.notes) say("note: {}\n", note);
   say("next: metastable {} {}\n", angles ? "collisions" : "diagnose", request.out);
 }
 
@@ -174,8 +175,11 @@ void run_import(const ImportRequest& request) {
   check_roles(file.map);
   const Provenance provenance{request.command, "imported from " + request.file, 0, version()};
   ImportOptions options;
+  options.subject = request.subject;
   options.description = description_of(request, file.rows, provenance_lines(provenance));
-  options.description_file = request.description.empty() ? "what is stated of wheel and ramp" : request.description;
+  options.description_file = !request.description.empty() ? request.description
+                             : request.walker             ? "what is stated of the walker"
+                                                          : "what is stated of wheel and ramp";
   options.number_trials = request.number_trials;
   options.first_collision = request.collisions_from;
   options.first_leg = request.legs_from;

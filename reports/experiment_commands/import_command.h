@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "analysis/study/setting.h"
+#include "analysis/walker_model/walk_folder.h"
 #include "reports/import/column_map.h"
 #include "reports/import/csv_form.h"
 #include "reports/import/mat_rows.h"
@@ -19,6 +20,7 @@ struct ImportRequest {
   std::string file, out;
   std::string json;  ///< file, "-" for standard output, "" for none
   std::string command;
+  Subject subject = Subject::wheel;
   std::vector<RequestedColumn> columns;
   AskedForm form = {};  ///< of a CSV
   TrialsIn orientation = TrialsIn::not_told;
@@ -30,6 +32,8 @@ struct ImportRequest {
   analysis::Setting setting = {};  ///< wheel, contact, ramp; its slope is of all conditions but those of `slopes`
   std::vector<std::pair<std::string, double>> slopes = {};  ///< id and slope [deg] of each condition
   std::optional<double> sensor_noise = {};                  ///< [rad/s]
+  std::optional<analysis::WalkerSetting> walker = {};  ///< of walks, where no description is given, instead of these
+  std::vector<std::pair<Role, double>> errors = {};    ///< sds of measured values of walks [rad, rad/s]
   std::string title;
 };
 

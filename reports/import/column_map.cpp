@@ -34,22 +34,35 @@ constexpr Unit angles[] = {{"rad", "rad", 1}, {"deg", "deg", degree}, {"rev", "r
 struct RoleInfo {
   Role role;
   std::string_view name;
-  std::string_view in_folder;   // its column in an experiment folder
-  std::span<const Unit> units;  // empty: none
+  std::string_view in_folder;                  // its column in an experiment folder
+  std::span<const Unit> units;                 // empty: none
+  std::optional<double> ImportedRow::*member;  // nullptr: it is a text
 };
-const RoleInfo roles[] = {{Role::condition, "condition", "condition", {}},
-                          {Role::trial, "trial", "trial", {}},
-                          {Role::collision, "collision", "collision", {}},
-                          {Role::leg, "leg", "leg", {}},
-                          {Role::time, "time", "time_s", times},
-                          {Role::position, "position", "position_m", lengths},
-                          {Role::omega_minus, "omega_minus", "omega_minus_rad_s", speeds},
-                          {Role::omega_plus, "omega_plus", "omega_plus_rad_s", speeds},
-                          {Role::outcome, "outcome", "outcome", {}},
-                          {Role::angle, "angle", "angle_rad", angles}};
+const RoleInfo roles[] = {{Role::condition, "condition", "condition", {}, nullptr},
+                          {Role::trial, "trial", "trial", {}, nullptr},
+                          {Role::collision, "collision", "collision", {}, &ImportedRow::collision},
+                          {Role::leg, "leg", "leg", {}, &ImportedRow::leg},
+                          {Role::time, "time", "time_s", times, &ImportedRow::time},
+                          {Role::position, "position", "position_m", lengths, &ImportedRow::position},
+                          {Role::omega_minus, "omega_minus", "omega_minus_rad_s", speeds, &ImportedRow::omega_minus},
+                          {Role::omega_plus, "omega_plus", "omega_plus_rad_s", speeds, &ImportedRow::omega_plus},
+                          {Role::outcome, "outcome", "outcome", {}, nullptr},
+                          {Role::angle, "angle", "angle_rad", angles, &ImportedRow::angle},
+                          {Role::step, "step", "step", {}, &ImportedRow::collision},
+                          {Role::phase, "phase", "phase", {}, &ImportedRow::leg},
+                          {Role::half_angle, "half_angle", "half_angle_rad", angles, &ImportedRow::half_angle},
+                          {Role::stance_rate, "stance_rate", "stance_rate_rad_s", speeds, &ImportedRow::stance_rate},
+                          {Role::swing_rate, "swing_rate", "swing_rate_rad_s", speeds, &ImportedRow::swing_rate}};
 static_assert(std::size(roles) == role_count);
 
 const RoleInfo& info(Role role) { return roles[static_cast<std::size_t>(role)]; }
+
+bool is_of(Role role, Subject subject) {
+  if (role == Role::condition || role == Role::trial || role == Role::time || role == Role::position ||
+      role == Role::outcome)
+    return true;
+  return (role >= Role::step) == (subject == Subject::walks);
+}
 
 std::string known(std::span<const std::string> names) {
   constexpr std::size_t most = 30;
@@ -205,26 +218,31 @@ MappedColumn found_column(const RequestedColumn& request, std::span<const std::s
 
 std::string_view role_name(Role role) { return info(role).name; }
 
-std::vector<RequestedColumn> column_requests(const std::string& text) {
+std::string_view column_in_folder(Role role) { return info(role).in_folder; }
+
+std::optional<double> ImportedRow::*value_member(Role role) { return info(role).member; }
+
+std::vector<RequestedColumn> column_requests(const std::string& text, Subject subject) {
   std::vector<RequestedColumn> requests;
   std::istringstream stream(text);
   for (std::string entry; std::getline(stream, entry, ',');) {
     const std::size_t equals = entry.find('=');
     const std::string what = entry.substr(0, equals);
     std::vector<std::string> names;
-    for (const RoleInfo& role : roles) names.emplace_back(role.name);
-    const auto role = std::ranges::find(names, what);
-    if (equals == std::string::npos || equals + 1 == entry.size() || role == names.end())
+    for (const RoleInfo& role : roles)
+      if (is_of(role.role, subject)) names.emplace_back(role.name);
+    const bool known = std::ranges::find(names, what) != names.end();
+    if (equals == std::string::npos || equals + 1 == entry.size() || !known)
       throw std::invalid_argument(
           fmt::format("--columns: {} is not WHAT=NAME or WHAT=NAME[UNIT], where WHAT is one of {}{}",
                       analysis::shown_text(entry), fmt::join(names, ", "), analysis::did_you_mean(what, names)));
-    requests.push_back({roles[role - names.begin()].role, entry.substr(equals + 1)});
+    requests.push_back({std::ranges::find(roles, what, &RoleInfo::name)->role, entry.substr(equals + 1)});
   }
   return requests;
 }
 
 std::vector<MappedColumn> map_columns(const std::vector<RequestedColumn>& requests, std::span<const std::string> names,
-                                      const std::string& file, int first_collision) {
+                                      const std::string& file, int first_collision, Subject subject) {
   std::vector<MappedColumn> map;
   std::vector<bool> used(names.size());
   const auto take = [&](MappedColumn column) {
@@ -239,7 +257,8 @@ std::vector<MappedColumn> map_columns(const std::vector<RequestedColumn>& reques
   for (const RequestedColumn& request : requests) take(found_column(request, names, file, first_collision));
   for (const RoleInfo& role : roles) {
     const auto at = std::ranges::find(names, role.in_folder);
-    if (at == names.end() || column_of(map, role.role) != nullptr || used[static_cast<std::size_t>(at - names.begin())])
+    if (!is_of(role.role, subject) || at == names.end() || column_of(map, role.role) != nullptr ||
+        used[static_cast<std::size_t>(at - names.begin())])
       continue;
     take(found_column({role.role, *at}, names, file, first_collision));
   }
@@ -269,6 +288,16 @@ bool is_unit(std::string_view text) {
 const MappedColumn* column_of(const std::vector<MappedColumn>& map, Role role) {
   const auto at = std::ranges::find(map, role, &MappedColumn::role);
   return at == map.end() ? nullptr : &*at;
+}
+
+const MappedColumn* main_column(const std::vector<MappedColumn>& map) {
+  for (const Role role : {Role::omega_minus, Role::half_angle, Role::angle})
+    if (const MappedColumn* column = column_of(map, role)) return column;
+  return nullptr;
+}
+
+std::string_view main_name(Subject subject) {
+  return subject == Subject::walks ? "half_angle" : "omega_minus (or angle)";
 }
 
 }  // namespace metastable::reports

@@ -2,18 +2,46 @@
 // Finds which column or variable of a foreign file tells what, and in which unit.
 
 #include <cstddef>
+#include <optional>
 #include <span>
 #include <string>
 #include <string_view>
 #include <vector>
 
+#include "reports/import/imported_rows.h"
+
 namespace metastable::reports {
 
-/// Says what a column tells, as the files of an experiment folder do.
-enum class Role { condition, trial, collision, leg, time, position, omega_minus, omega_plus, outcome, angle };
-inline constexpr std::size_t role_count = 10;
+/// Says what a column tells, as the files of an experiment folder do; from `step` on only those of walks.
+enum class Role {
+  condition,
+  trial,
+  collision,
+  leg,
+  time,
+  position,
+  omega_minus,
+  omega_plus,
+  outcome,
+  angle,
+  step,
+  phase,
+  half_angle,
+  stance_rate,
+  swing_rate
+};
+inline constexpr std::size_t role_count = 15;
+
+/// Says of what a file tells.
+enum class Subject { wheel, walks };
 
 std::string_view role_name(Role role);
+
+/// Returns the name of its column in an experiment folder.
+std::string_view column_in_folder(Role role);
+
+/// Returns where a row holds the number that the role tells; nullptr: it tells a text.
+std::optional<double> ImportedRow::*value_member(Role role);
 
 /// Holds one entry of the map that a user gives: ROLE=NAME or ROLE=NAME[UNIT].
 struct RequestedColumn {
@@ -22,7 +50,7 @@ struct RequestedColumn {
 };
 
 /// Reads entries with commas between them. @throws std::invalid_argument naming the entry and what is expected
-std::vector<RequestedColumn> column_requests(const std::string& text);
+std::vector<RequestedColumn> column_requests(const std::string& text, Subject subject);
 
 /// Holds where a role is told.
 struct MappedColumn {
@@ -42,7 +70,7 @@ struct MappedColumn {
 /// @throws std::invalid_argument for a name that is not there, a unit that is not told or of another kind, a role or a
 ///         column asked for twice, numbers behind * that skip or repeat
 std::vector<MappedColumn> map_columns(const std::vector<RequestedColumn>& requests, std::span<const std::string> names,
-                                      const std::string& file, int first_collision);
+                                      const std::string& file, int first_collision, Subject subject);
 
 /// Says whether every requested name is there, whatever its unit.
 bool names_all(const std::vector<RequestedColumn>& requests, std::span<const std::string> names, int first_collision);
@@ -52,5 +80,11 @@ bool is_unit(std::string_view text);
 
 /// Returns what tells the role, or nullptr.
 const MappedColumn* column_of(const std::vector<MappedColumn>& map, Role role);
+
+/// Returns what every row has: omega_minus or, instead, angle; of walks half_angle. nullptr: nothing of these is told.
+const MappedColumn* main_column(const std::vector<MappedColumn>& map);
+
+/// Returns the name of what every row has, for messages: "omega_minus (or angle)".
+std::string_view main_name(Subject subject);
 
 }  // namespace metastable::reports

@@ -22,13 +22,8 @@ class CsvRows {
 
   // Reads the values of one collision. @param number  of a wide row's columns, from 0; 0 in a long row
   void read(ImportedRow& row, std::size_t number) const {
-    row.collision = value(Role::collision, number);
-    row.leg = value(Role::leg, number);
-    row.time = value(Role::time, number);
-    row.position = value(Role::position, number);
-    row.omega_minus = value(Role::omega_minus, number);
-    row.omega_plus = value(Role::omega_plus, number);
-    row.angle = value(Role::angle, number);
+    for (const MappedColumn& column : map_)
+      if (const auto member = value_member(column.role)) row.*member = value(column, number);
   }
 
   // Says whether any of the columns of this number is filled.
@@ -49,12 +44,11 @@ class CsvRows {
     return std::string(csv_.text(column->columns.front()));
   }
 
-  std::optional<double> value(Role role, std::size_t number) const {
-    const MappedColumn* column = column_of(map_, role);
-    if (column == nullptr || number >= column->columns.size()) return std::nullopt;
-    const std::size_t at = column->columns[number];
+  std::optional<double> value(const MappedColumn& column, std::size_t number) const {
+    if (number >= column.columns.size()) return std::nullopt;
+    const std::size_t at = column.columns[number];
     std::optional<double> read;
-    if (!unknown(csv_.text(at)) && csv_.read(at, {}, read) && read && column->scale != 1) *read *= column->scale;
+    if (!unknown(csv_.text(at)) && csv_.read(at, {}, read) && read && column.scale != 1) *read *= column.scale;
     return read;
   }
 
@@ -74,15 +68,16 @@ std::vector<ImportedRow> csv_rows(const std::string& file, std::string_view text
     for (const std::string& name : names) all.push_back({name});
     return all;
   }();
-  const MappedColumn* speed = column_of(map, Role::omega_minus);
-  const bool wide = speed != nullptr && speed->numbered;
+  const MappedColumn* main = main_column(map);
+  const bool wide = main != nullptr && main->role != Role::angle && main->numbered;
   analysis::CsvForm lenient = form;
   lenient.ragged = wide;  // a trial ends where its row does
   analysis::CsvReader csv(file, text, columns, defects, lenient);
   for (const MappedColumn& column : map) {
     if (column.numbered && !wide)
-      throw std::invalid_argument(
-          fmt::format("--columns: {}: a * numbers collisions only where omega_minus has one", role_name(column.role)));
+      throw std::invalid_argument(fmt::format("--columns: {}: a * numbers its columns only where {} has one",
+                                              role_name(column.role),
+                                              main && main->role == Role::half_angle ? "half_angle" : "omega_minus"));
     if (wide && !column.numbered && column.role != Role::condition && column.role != Role::trial &&
         column.role != Role::outcome)
       throw std::invalid_argument(fmt::format(
@@ -98,18 +93,18 @@ std::vector<ImportedRow> csv_rows(const std::string& file, std::string_view text
       rows.push_back(std::move(row));
       continue;
     }
-    std::size_t last = 0;  // one past the last collision
+    std::size_t last = 0;  // one past the last number
     for (const MappedColumn& column : map)
       for (std::size_t k = last; column.numbered && k < column.columns.size(); ++k)
         if (reader.any(k)) last = k + 1;
-    if (last == 0) csv.refuse(speed->columns.front(), "the row holds no collision");
+    if (last == 0) csv.refuse(main->columns.front(), "the row holds no number");
     if (!row.trial && column_of(map, Role::trial) == nullptr) row.trial = fmt::format("{}", trial);
     for (std::size_t k = 0; k < last; ++k) {
       ImportedRow& one = rows.emplace_back(row);
       reader.read(one, k);
       one.collision = static_cast<double>(k) + first_collision;
-      if (!one.omega_minus && defects.empty())
-        csv.refuse(speed->columns[std::min(k, speed->columns.size() - 1)],
+      if (main->role == Role::omega_minus && !one.omega_minus && defects.empty())
+        csv.refuse(main->columns[std::min(k, main->columns.size() - 1)],
                    "no speed, although the trial goes on or other columns tell of this collision");
     }
   }

@@ -1,17 +1,20 @@
 #include "reports/import/imported_experiment.h"
 
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 
 #include <algorithm>
 #include <charconv>
 #include <cmath>
 #include <iterator>
 #include <optional>
+#include <set>
 #include <utility>
 
 #include "analysis/experiment/csv_field.h"
 #include "analysis/experiment/input_error.h"
 #include "analysis/motion_capture/angle_file.h"
+#include "analysis/walker_model/walk_folder.h"
 
 namespace metastable::reports {
 namespace {
@@ -90,12 +93,11 @@ Outcomes outcomes_of(const std::vector<ImportedRow>& rows, const std::vector<lon
     if (!rows[i].outcome) continue;
     const auto word = options.outcomes.find(*rows[i].outcome);
     const std::string outcome = word == options.outcomes.end() ? *rows[i].outcome : word->second;
-    if (outcome != "rest" && outcome != "end_of_ramp" && outcome != "max_collisions")
-      defects.add_row(
-          rows[i].place,
-          fmt::format("outcome: {0} is none of rest, end_of_ramp, max_collisions; --outcomes rest={1} would say "
-                      "that it is the first",
-                      shown_text(outcome), outcome));
+    const std::vector<std::string> known = outcome_names(options.subject);
+    if (std::ranges::find(known, outcome) == known.end())
+      defects.add_row(rows[i].place,
+                      fmt::format("outcome: {} is none of {}; --outcomes {}={} would say that it is the first",
+                                  shown_text(outcome), fmt::join(known, ", "), known.front(), outcome));
     else if (!told.outcome.empty() && told.outcome != outcome)
       defects.add_row(rows[i].place, fmt::format("outcome: {} after {} of the same trial", outcome, told.outcome));
     else
@@ -154,15 +156,86 @@ std::string angle_csv(const std::vector<ImportedRow>& rows, const std::vector<lo
   return csv;
 }
 
+// Puts the rows of each trial together, by step, for steps.csv wants them so.
+void put_in_order(std::vector<ImportedRow>& rows) {
+  std::map<TrialKey, std::size_t> first;
+  for (const ImportedRow& row : rows) first.emplace(key_of(row), first.size());
+  std::ranges::stable_sort(
+      rows, {}, [&](const ImportedRow& row) { return std::pair(first.at(key_of(row)), row.collision.value_or(0)); });
+}
+
+std::string steps_csv(const std::vector<ImportedRow>& rows, const std::vector<long>& numbers,
+                      const ImportOptions& options) {
+  struct Column {
+    const char* name;
+    std::optional<double> ImportedRow::*member;
+    int first;  // what the file calls 1, less 1
+  };
+  std::vector<Column> columns{{"step", &ImportedRow::collision, options.first_collision - 1}};
+  for (const Column& column : {Column{"phase", &ImportedRow::leg, options.first_leg - 1},
+                               {"time_s", &ImportedRow::time, 0},
+                               {"position_m", &ImportedRow::position, 0},
+                               {"half_angle_rad", &ImportedRow::half_angle, 0},
+                               {"stance_rate_rad_s", &ImportedRow::stance_rate, 0},
+                               {"swing_rate_rad_s", &ImportedRow::swing_rate, 0}})
+    if (std::ranges::any_of(rows, [&](const ImportedRow& row) { return (row.*column.member).has_value(); }))
+      columns.push_back(column);
+  const bool condition = told_of_conditions(rows);
+  std::string csv = condition ? "condition,trial" : "trial";
+  for (const Column& column : columns) csv += fmt::format(",{}", column.name);
+  csv += "\n";
+  for (std::size_t i = 0; i < rows.size(); ++i) {
+    csv += begin_of(rows[i], numbers[i], condition);
+    for (const Column& column : columns) csv += "," + less(rows[i].*column.member, column.first);
+    csv += "\n";
+  }
+  return csv;
+}
+
 // Counts the collisions of each trial where the file does not.
 void count_collisions(std::vector<ImportedRow>& rows, const std::vector<long>& numbers, int first) {
   std::map<long, int> so_far;
   for (std::size_t i = 0; i < rows.size(); ++i) rows[i].collision = first + so_far[numbers[i]]++;
 }
 
+// Counts conditions, trials and rows.
+void count(Imported& imported, const std::vector<ImportedRow>& rows, const std::vector<long>& numbers) {
+  std::set<std::pair<std::string, long>> trials;
+  for (std::size_t i = 0; i < rows.size(); ++i) {
+    const std::string id = rows[i].condition.value_or("");
+    auto at = std::ranges::find(imported.conditions, id, &Imported::Counted::id);
+    if (at == imported.conditions.end()) at = imported.conditions.insert(at, Imported::Counted{id});
+    ++at->rows;
+    at->trials += trials.emplace(id, numbers[i]).second;
+  }
+  imported.rows = rows.size();
+  imported.trials = trials.size();
+}
+
+// Reads the folder's texts as they will be read. @throws analysis::InputError
+void read_back(Imported& imported, Subject subject) {
+  if (subject == Subject::walks) {
+    analysis::parse_walks(imported.source);
+    return;
+  }
+  const bool angles = imported.source.angle_csv.has_value();
+  analysis::Experiment experiment =
+      angles ? analysis::parse_description(imported.source) : analysis::parse_experiment(imported.source);
+  if (angles) analysis::parse_angles(imported.source, experiment);
+  imported.notes = experiment.notes;
+  if (imported.conditions.size() == 1 && experiment.conditions.size() == 1)
+    imported.conditions.front().id = experiment.conditions.front().id;
+}
+
 }  // namespace
 
+std::vector<std::string> outcome_names(Subject subject) {
+  if (subject == Subject::walks) return {"failed", "stopped", "lost"};
+  return {"rest", "end_of_ramp", "max_collisions"};
+}
+
 Imported imported_experiment(const std::string& file, std::vector<ImportedRow> rows, const ImportOptions& options) {
+  const bool walks = options.subject == Subject::walks;
   const auto told = [&](std::optional<double> ImportedRow::*what) {
     return std::ranges::any_of(rows, [&](const ImportedRow& row) { return (row.*what).has_value(); });
   };
@@ -175,6 +248,7 @@ Imported imported_experiment(const std::string& file, std::vector<ImportedRow> r
     for (ImportedRow& row : rows) row.trial = "1";
     imported.assumed.push_back("all frames are of one trial");
   }
+  if (walks) put_in_order(rows);
   const std::vector<long> numbers = trial_numbers(rows, options.number_trials, defects);
   defects.check();
   if (options.number_trials)
@@ -182,7 +256,7 @@ Imported imported_experiment(const std::string& file, std::vector<ImportedRow> r
         "trials are numbered in the order of their first rows, taken as the order they were run");
   if (!angles && !told(&ImportedRow::collision)) {
     count_collisions(rows, numbers, options.first_collision);
-    imported.assumed.push_back("collisions are counted in the order of the rows");
+    imported.assumed.push_back(fmt::format("{} are counted in the order of the rows", walks ? "steps" : "collisions"));
   }
   const Outcomes outcomes = outcomes_of(rows, numbers, options, defects);
   defects.check();
@@ -190,20 +264,20 @@ Imported imported_experiment(const std::string& file, std::vector<ImportedRow> r
   analysis::ExperimentSource& source = imported.source;
   source.experiment_toml = options.description;
   if (!outcomes.csv.empty()) source.trials_csv = outcomes.csv;
-  (angles ? source.angle_csv : source.collisions_csv) =
-      angles ? angle_csv(rows, numbers) : collisions_csv(rows, numbers, options);
-  imported.rows = rows.size();
-  std::vector<long> trials = numbers;
-  std::ranges::sort(trials);
-  imported.trials = static_cast<std::size_t>(std::ranges::unique(trials).begin() - trials.begin());
+  if (walks)
+    source.steps_csv = steps_csv(rows, numbers, options);
+  else if (angles)
+    source.angle_csv = angle_csv(rows, numbers);
+  else
+    source.collisions_csv = collisions_csv(rows, numbers, options);
+  count(imported, rows, numbers);
   try {
-    imported.experiment = angles ? analysis::parse_description(source) : analysis::parse_experiment(source);
-    if (angles) analysis::parse_angles(source, imported.experiment);
+    read_back(imported, options.subject);
   } catch (const analysis::InputError& error) {
     std::vector<std::string> places, lines;
     for (const ImportedRow& row : rows) places.push_back(row.place);
     for (std::string line : error.lines()) {
-      line = in_terms_of(line, angles ? "angle.csv" : "collisions.csv", file, places);
+      line = in_terms_of(line, walks ? "steps.csv" : angles ? "angle.csv" : "collisions.csv", file, places);
       line = in_terms_of(line, "trials.csv", file, outcomes.places);
       constexpr std::string_view description = "experiment.toml";
       if (line.starts_with(description)) line = options.description_file + line.substr(description.size());

@@ -6,25 +6,35 @@
 #include <vector>
 
 #include "analysis/experiment/experiment.h"
+#include "reports/import/column_map.h"
 #include "reports/import/imported_rows.h"
 
 namespace metastable::reports {
 
 struct ImportOptions {
+  Subject subject = Subject::wheel;
   std::string description;                           ///< experiment.toml
   std::string description_file;                      ///< for messages
   bool number_trials = false;                        ///< in the order of their first rows, whatever the file calls them
-  int first_collision = 1;                           ///< what the file calls collision 1, 0 or 1
-  int first_leg = 0;                                 ///< what the file calls leg 0, 0 or 1
+  int first_collision = 1;                           ///< what the file calls collision or step 1, 0 or 1
+  int first_leg = 0;                                 ///< what the file calls leg 0, or phase 1: 0 or 1
   std::map<std::string, std::string> outcomes = {};  ///< the file's word for an outcome, and the folder's
 };
 
 struct Imported {
-  analysis::ExperimentSource source;  ///< its texts; angle.csv instead of collisions.csv where angles were told
-  analysis::Experiment experiment;    ///< as it will be read back; of angles, their trials without collisions
+  /// Holds its texts: of walks steps.csv, where angles were told angle.csv instead of collisions.csv.
+  analysis::ExperimentSource source;
+  struct Counted {
+    std::string id;
+    std::size_t trials = 0, rows = 0;
+  };
+  std::vector<Counted> conditions;
   std::size_t trials = 0, rows = 0;
-  std::vector<std::string> assumed;  ///< a sentence each
+  std::vector<std::string> assumed, notes;  ///< a sentence each
 };
+
+/// Returns what may come of a trial, as the folder has it.
+std::vector<std::string> outcome_names(Subject subject);
 
 /// Everything that reading an experiment folder checks is checked here, and said of the place in the foreign file.
 /// @param file  for messages

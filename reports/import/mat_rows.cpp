@@ -122,29 +122,7 @@ class MatFile {
   std::vector<std::string> names_;
 };
 
-using Value = std::optional<double> ImportedRow::*;
 using Text = std::optional<std::string> ImportedRow::*;
-
-Value value_member(Role role) {
-  switch (role) {
-    case Role::collision:
-      return &ImportedRow::collision;
-    case Role::leg:
-      return &ImportedRow::leg;
-    case Role::time:
-      return &ImportedRow::time;
-    case Role::position:
-      return &ImportedRow::position;
-    case Role::omega_minus:
-      return &ImportedRow::omega_minus;
-    case Role::omega_plus:
-      return &ImportedRow::omega_plus;
-    case Role::angle:
-      return &ImportedRow::angle;
-    default:
-      return nullptr;
-  }
-}
 
 Text text_member(Role role) {
   return role == Role::condition ? &ImportedRow::condition
@@ -177,19 +155,21 @@ bool is_vector(const Piece& piece) { return piece.rows <= 1 || piece.columns <= 
 
 class MatTrials {
  public:
-  MatTrials(const MatFile& file, const std::vector<MappedColumn>& map, TrialsIn orientation, bool hdf5) : file_(file) {
+  MatTrials(const MatFile& file, const std::vector<MappedColumn>& map, TrialsIn orientation, bool hdf5, Subject subject)
+      : file_(file) {
     const Told* trial = nullptr;
+    const MappedColumn* main = main_column(map);
     for (const MappedColumn& column : map) {
       Told& told = told_.emplace_back(Told{column, file.at(column.name)});
       if (told.found.pieces.empty()) file.refuse(column.name, "is empty");
     }
     for (const Told& told : told_) {
-      if (told.column.role == Role::omega_minus || (told.column.role == Role::angle && main_ == nullptr)) main_ = &told;
+      if (main && told.column.role == main->role) main_ = &told;
       if (told.column.role == Role::trial) trial = &told;
     }
     if (main_ == nullptr)
-      throw std::invalid_argument(fmt::format("--columns: which variable of {} is omega_minus (or angle)? It has {}",
-                                              file.path(), fmt::join(file.names(), ", ")));
+      throw std::invalid_argument(fmt::format("--columns: which variable of {} is {}? It has {}", file.path(),
+                                              main_name(subject), fmt::join(file.names(), ", ")));
     const Piece& first = main_->first();
     if (main_->found.each) {
       shape_ = Shape::each;
@@ -289,7 +269,8 @@ class MatTrials {
     if (main.values.empty()) file_.refuse(main.place, fmt::format("trial {} holds no number", trial + 1));
     for (std::size_t i = 0; i < main.values.size(); ++i) {
       ImportedRow& row = rows.emplace_back(ImportedRow{.place = fmt::format("{}: {}", file_.path(), main.at(i))});
-      if (std::isnan(main.values[i])) bad(row.place, "NaN before the last number");
+      if (std::isnan(main.values[i]) && main_->column.role != Role::half_angle)
+        bad(row.place, "NaN before the last number");
       if (!all) row.trial = fmt::format("{}", trial + 1);
     }
     for (const Told& told : told_) {
@@ -331,16 +312,16 @@ class MatTrials {
 }  // namespace
 
 MatRows mat_rows(const std::string& path, std::string_view text, const std::vector<RequestedColumn>& requests,
-                 TrialsIn orientation, int first_collision) {
+                 TrialsIn orientation, int first_collision, Subject subject) {
   const MatFile file(path, mat_variables(path, text));
   MatRows read{.rows = {},
-               .map = map_columns(requests, file.names(), path, first_collision),
+               .map = map_columns(requests, file.names(), path, first_collision, subject),
                .names = file.names(),
                .found = {}};
   for (const MappedColumn& column : read.map)
     if (column.numbered)
       throw std::invalid_argument(fmt::format("--columns: {}: a * is for columns of a CSV", role_name(column.role)));
-  const MatTrials trials(file, read.map, orientation, is_hdf5_file(text));
+  const MatTrials trials(file, read.map, orientation, is_hdf5_file(text), subject);
   read.rows = trials.rows();
   read.found = trials.found();
   return read;

@@ -30,6 +30,6 @@ struct MatRows {
 /// @throws std::invalid_argument as mat_variables(), and for a variable that is not there or of another shape, naming
 ///         it; analysis::InputError
 MatRows mat_rows(const std::string& file, std::string_view text, const std::vector<RequestedColumn>& requests,
-                 TrialsIn orientation, int first_collision);
+                 TrialsIn orientation, int first_collision, Subject subject);
 
 }  // namespace metastable::reports
