@@ -439,6 +439,7 @@ Diagnosis answer(const TransitionModel& model, const Fitted& fitted, const std::
       is_gap(d.verdict) && &cause != &fitted.recalibrated ? telling(ordered, d) : std::vector<WeighedFit>{}, elsewhere,
       options, [&] { progress(0.9, "steps before failure"); });
   d.shrinkage.profile = collision_profile(model, fitted.given.nuisance, cause, options.seed);
+  if (is_gap(d.verdict)) d.shrinkage.drawn_with_effect = model.simulate(cause.nuisance, cause.terms, options.seed);
   progress(0.93, "what could not be seen");
   d.limits.missing = missing_columns(model, fitted.recalibrated, candidates, d.rules, options.threads, options.seed);
   d.limits.not_possible = not_possible(model, d, options);

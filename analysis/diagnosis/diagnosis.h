@@ -183,6 +183,8 @@ struct Diagnosis {
     std::vector<Shrinkage> measures;  ///< log score first, then CRPS; empty: too few trials
     StepsBeforeFailure steps;
     std::vector<ProfilePoint> profile;
+    /// Holds an experiment drawn from the chosen model, of the size of the one measured; nullptr where there is no gap.
+    std::shared_ptr<const TransitionModel> drawn_with_effect;
   } shrinkage;
 
   /// Says what these data could not tell, and an experiment that would.

@@ -28,16 +28,18 @@ struct Sum {
     return count > 1 ? std::sqrt(std::max(0.0, squares / count - mean() * mean()) * count / (count - 1)) : 0;
   }
 };
-using Sums = std::vector<std::vector<Sum>>;  // by condition and collision
+using Sums = std::vector<std::vector<Sum>>;  // by condition and column, and by collision
 
 // A collision may have two events, of which the first tells the speed before it.
 void gather(const TransitionModel& model, Sums& sums) {
-  const Event* previous = nullptr;
+  const std::size_t columns = model.columns().size();
+  std::vector<const Event*> previous(columns, nullptr);
   for (const Event& e : model.events()) {
-    if (!is_contact(e.kind) || e.column > 0 || e.number > longest_profile || !std::isfinite(e.speed)) continue;
-    if (previous && previous->trial == e.trial && previous->number == e.number) continue;
-    previous = &e;
-    std::vector<Sum>& of = sums[e.condition];
+    if (!is_contact(e.kind) || e.number > longest_profile || !std::isfinite(e.speed)) continue;
+    const Event*& before = previous[e.column];
+    if (before && before->trial == e.trial && before->number == e.number) continue;
+    before = &e;
+    std::vector<Sum>& of = sums[e.condition * columns + e.column];
     const auto number = static_cast<std::size_t>(e.number);
     if (of.size() < number) of.resize(number);
     of[number - 1].add(e.speed);
@@ -48,7 +50,8 @@ void gather(const TransitionModel& model, Sums& sums) {
 
 std::vector<ProfilePoint> collision_profile(const TransitionModel& model, const std::vector<double>& nominal,
                                             const Fit& chosen, std::uint64_t seed) {
-  Sums measured(model.conditions()), given(model.conditions()), with(model.conditions());
+  const std::size_t columns = model.columns().size();
+  Sums measured(model.conditions() * columns), given(measured.size()), with(measured.size());
   gather(model, measured);
   for (std::uint64_t round = 0; round < rounds; ++round) {
     gather(*model.simulate(nominal, {}, seed + round), given);
@@ -60,7 +63,8 @@ std::vector<ProfilePoint> collision_profile(const TransitionModel& model, const 
       const Sum& m = measured[c][k];
       if (m.count < least_trials) continue;
       ProfilePoint p;
-      p.condition = c;
+      p.condition = c / columns;
+      p.column = c % columns;
       p.collision = static_cast<int>(k) + 1;
       p.trials = static_cast<std::size_t>(m.count);
       p.measured = m.mean();

@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <iterator>
 #include <limits>
 #include <map>
 #include <optional>
@@ -26,7 +27,8 @@ constexpr std::size_t furthest_rows = 8, least_rows = 3, most_rows = 14;  // of 
 // A place is shown alone where its score is beyond this: of some hundred that are chance, one in three maps has such
 // one.
 constexpr double telling = 3;
-constexpr int shrinkage_height = 250, furthest_width = 520, map_width = 640, row_height = 30;  // [px]
+constexpr int shrinkage_height = 250, least_width = 520, scale_width = 110, cell_width = 70, letter_width = 8,
+              row_height = 30;  // [px]
 constexpr int given_colour = 1, recalibrated_colour = 4, effect_colour = 0, floor_colour = 6;
 
 constexpr std::string_view stance_mark = ", stance", collision_mark = ", collision",
@@ -109,8 +111,11 @@ Figure map_figure(const std::vector<Row>& rows, const std::vector<std::string>& 
     map.y_names.push_back(with_phase && !row->phase.empty() ? row->name + ", " + row->phase : row->name);
     map.value.push_back(row->scores);
   }
+  std::size_t longest = 0;
+  for (const std::string& name : map.y_names) longest = std::max(longest, name.size());
   figure.heat_map = std::move(map);
-  figure.width = map_width;
+  figure.width = std::max(least_width, scale_width + cell_width * static_cast<int>(columns.size()) +
+                                           letter_width * static_cast<int>(longest));
   figure.height = 140 + row_height * static_cast<int>(rows.size());
   return figure;
 }
@@ -131,8 +136,39 @@ std::optional<Figure> furthest_figure(std::vector<Row> rows, const std::vector<M
                   row.scores.begin() + static_cast<std::ptrdiff_t>(first + models.size())};
   const bool mixed = std::ranges::any_of(rows, [&](const Row& row) { return row.phase != rows.front().phase; });
   if (!mixed && !rows.front().phase.empty()) title += fmt::format(", {}s", rows.front().phase);
-  Figure figure = map_figure(rows, columns, id, title, mixed, 1);
-  figure.width = furthest_width;
+  return map_figure(rows, columns, id, title, mixed, 1);
+}
+
+// Draws the means of one condition and column, collision by collision. @param points  one or more
+Figure profile_figure(const Diagnosis& d, const std::vector<analysis::ProfilePoint>& points) {
+  Series measured{.label = "measured", .style = Style::points, .x = {}, .y = {}, .colour = floor_colour};
+  Series given{.label = "as given", .style = Style::dashed, .x = {}, .y = {}, .colour = given_colour};
+  Series effect{.label = d.verdict == analysis::Verdict::explained ? "with effect" : "best model",
+                .style = Style::line,
+                .x = {},
+                .y = {},
+                .colour = effect_colour};
+  Series band{.style = Style::band, .x = {}, .lower = {}, .upper = {}, .colour = effect_colour};
+  for (const analysis::ProfilePoint& p : points) {
+    const double x = p.collision;
+    measured.x.push_back(x), measured.y.push_back(p.measured);
+    measured.lower.push_back(p.measured - analysis::normal_95 * p.measured_error);
+    measured.upper.push_back(p.measured + analysis::normal_95 * p.measured_error);
+    if (std::isfinite(p.baseline)) given.x.push_back(x), given.y.push_back(p.baseline);
+    if (!std::isfinite(p.with_effect)) continue;
+    effect.x.push_back(x), effect.y.push_back(p.with_effect);
+    band.x.push_back(x);
+    band.lower.push_back(p.with_effect - p.band), band.upper.push_back(p.with_effect + p.band);
+  }
+  Figure figure{.id = {},
+                .title = {},
+                .x = {.label = d.data.step_name, .low = measured.x.front() - 0.5, .high = measured.x.back() + 0.5},
+                .y = of_speeds(d) ? FigureAxis{"mean speed before it", "rad/s"}
+                     : d.model    ? FigureAxis{"mean " + d.model->columns()[points.front().column].name}
+                                  : FigureAxis{"mean"}};
+  for (Series* series : {&band, &given, &effect, &measured})
+    if (!series->x.empty()) figure.series.push_back(std::move(*series));
+  figure.legend = Legend::below;
   return figure;
 }
 
@@ -167,6 +203,12 @@ std::vector<Figure> return_map_figures(const Diagnosis& d) {
   std::vector<Figure> figures;
   for (std::size_t c = 0; c < columns.size() && c < most_return_maps; ++c) {
     Series drawn{.label = "simulated, as given", .style = Style::dots, .x = {}, .y = {}, .colour = given_colour};
+    Series mended{
+        .label = d.verdict == analysis::Verdict::explained ? "simulated, with effect" : "simulated, best model",
+        .style = Style::dots,
+        .x = {},
+        .y = {},
+        .colour = recalibrated_colour};
     Series measured{.label = "measured", .style = Style::dots, .x = {}, .y = {}, .colour = effect_colour};
     const auto fill = [&](const analysis::TransitionModel& model, Series& series) {
       const analysis::Event* before = nullptr;
@@ -181,13 +223,14 @@ std::vector<Figure> return_map_figures(const Diagnosis& d) {
       }
     };
     fill(*simulated, drawn);
+    if (d.shrinkage.drawn_with_effect) fill(*d.shrinkage.drawn_with_effect, mended);
     fill(*d.model, measured);
     if (measured.x.empty()) continue;
     Figure figure{.id = fmt::format("return-map-{}", c + 1),
                   .title = columns[c].name,
                   .x = {"this step", columns[c].unit},
                   .y = {"next step", columns[c].unit}};
-    for (Series* series : {&drawn, &measured})
+    for (Series* series : {&drawn, &mended, &measured})
       if (!series->x.empty()) figure.series.push_back(std::move(*series));
     figure.diagonal = Diagonal::yes;
     figure.legend = Legend::below;
@@ -244,40 +287,21 @@ std::vector<Figure> map_figures(const Diagnosis& d) {
 }
 
 std::vector<Figure> profile_figures(const Diagnosis& d) {
+  const std::size_t columns = d.model ? d.model->columns().size() : 1;
   std::vector<Figure> figures;
-  for (std::size_t c = 0; c < d.data.condition_names.size(); ++c) {
-    Series measured{.label = "measured", .style = Style::points, .x = {}, .y = {}, .colour = floor_colour};
-    Series given{.label = "as given", .style = Style::dashed, .x = {}, .y = {}, .colour = given_colour};
-    Series effect{.label = d.verdict == analysis::Verdict::explained ? "with effect" : "best model",
-                  .style = Style::line,
-                  .x = {},
-                  .y = {},
-                  .colour = effect_colour};
-    Series band{.style = Style::band, .x = {}, .lower = {}, .upper = {}, .colour = effect_colour};
-    for (const analysis::ProfilePoint& p : d.shrinkage.profile) {
-      if (p.condition != c) continue;
-      const double x = p.collision;
-      measured.x.push_back(x), measured.y.push_back(p.measured);
-      measured.lower.push_back(p.measured - analysis::normal_95 * p.measured_error);
-      measured.upper.push_back(p.measured + analysis::normal_95 * p.measured_error);
-      if (std::isfinite(p.baseline)) given.x.push_back(x), given.y.push_back(p.baseline);
-      if (!std::isfinite(p.with_effect)) continue;
-      effect.x.push_back(x), effect.y.push_back(p.with_effect);
-      band.x.push_back(x);
-      band.lower.push_back(p.with_effect - p.band), band.upper.push_back(p.with_effect + p.band);
+  for (std::size_t c = 0; c < d.data.condition_names.size(); ++c)
+    for (std::size_t column = 0; column < columns; ++column) {
+      std::vector<analysis::ProfilePoint> points;
+      std::ranges::copy_if(d.shrinkage.profile, std::back_inserter(points),
+                           [&](const analysis::ProfilePoint& p) { return p.condition == c && p.column == column; });
+      if (points.empty()) continue;
+      Figure figure = profile_figure(d, points);
+      figure.id = fmt::format("profile-{}", figures.size() + 1);
+      figure.title = d.data.condition_names[c];
+      if (columns > 1)
+        figure.title = d.data.condition_names.size() > 1 ? figure.title + ", " + figure.y.label : figure.y.label;
+      figures.push_back(std::move(figure));
     }
-    if (measured.x.empty()) continue;
-    Figure figure{.id = fmt::format("profile-{}", c + 1),
-                  .title = d.data.condition_names[c],
-                  .x = {.label = d.data.step_name, .low = measured.x.front() - 0.5, .high = measured.x.back() + 0.5},
-                  .y = of_speeds(d) ? FigureAxis{"mean speed before it", "rad/s"}
-                       : d.model    ? FigureAxis{"mean " + d.model->columns().front().name}
-                                    : FigureAxis{"mean"}};
-    for (Series* series : {&band, &given, &effect, &measured})
-      if (!series->x.empty()) figure.series.push_back(std::move(*series));
-    figure.legend = Legend::below;
-    figures.push_back(std::move(figure));
-  }
   return figures;
 }
 

@@ -304,7 +304,7 @@ Table profile_table(const Diagnosis& d) {
   const std::string unit = speeds ? "rad/s" : "";
   Table table{.id = "profile",
               .title = speeds ? "Mean speed before a collision, measured and simulated"
-                              : "Mean of the first column by step, measured and simulated",
+                              : "Mean of each column by step, measured and simulated",
               .notes = {"Band: half-width of the 95 % band of the simulated mean of as many trials."},
               .columns = {{"condition"},
                           {speeds ? "collision" : "step"},
@@ -313,6 +313,7 @@ Table profile_table(const Diagnosis& d) {
                           {"as given", unit, NumberFormat::significant, 4},
                           {"with effect", unit, NumberFormat::significant, 4},
                           {"band", unit}}};
+  if (!speeds) table.columns.insert(table.columns.begin() + 1, {"column"});
   for (const analysis::ProfilePoint& p : d.shrinkage.profile) {
     const double half = analysis::normal_95 * p.measured_error;
     table.rows.push_back({d.data.condition_names.at(p.condition), p.collision, p.trials,
@@ -320,6 +321,7 @@ Table profile_table(const Diagnosis& d) {
                           : std::isnan(half)     ? Cell(p.measured)
                                                  : Cell(Estimate{p.measured, p.measured - half, p.measured + half}),
                           known_cell(p.baseline), known_cell(p.with_effect), known_cell(p.band)});
+    if (!speeds) table.rows.back().insert(table.rows.back().begin() + 1, Cell(d.model->columns().at(p.column).name));
   }
   return table;
 }

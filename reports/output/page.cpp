@@ -45,6 +45,7 @@ section { margin: 2.75rem 0; scroll-margin-top: 1rem; }
 .figures { display: grid; grid-template-columns: repeat(auto-fill, minmax(min(100%, max(25rem, 34%)), 1fr)); gap: .5rem 2rem; margin-top: .75rem; }
 .figures.one { grid-template-columns: minmax(0, 44rem); }
 figure { margin: 0 0 1.25rem; min-width: 0; }
+figure.wide { grid-column: 1 / -1; }
 figure svg { display: block; width: 100%; max-width: 44rem; height: auto; }
 .scroll > svg { min-width: 40rem; }
 figcaption { font-size: .95rem; max-width: 46rem; }
@@ -202,7 +203,7 @@ std::string figures_html(const std::vector<PageFigure>& figures) {
   std::string html = fmt::format("<div class=\"figures{}\">\n", figures.size() == 1 ? " one" : "");
   for (const PageFigure& figure : figures) {
     const std::string svg = inline_svg(figure.svg, figure.id);
-    html += fmt::format("<figure id=\"figure-{}\">\n", figure.id);
+    html += fmt::format("<figure id=\"figure-{}\"{}>\n", figure.id, figure.wide ? " class=\"wide\"" : "");
     html += figure.wide ? "<div class=\"scroll\" tabindex=\"0\">" + svg + "</div>\n" : svg + "\n";
     if (!figure.caption.empty()) html += fmt::format("<figcaption>{}</figcaption>\n", escape_html(figure.caption));
     html += "</figure>\n";
