@@ -696,8 +696,8 @@ def walker(step, dimension, noise, *, start, names=(), noise_names=(), phases=1,
                  start's, and `step` gets them within pi of zero, so that an orbit may lie where they wrap
 
     Where the orbit is unstable, and without noise the map leads on to another one, which may come back after several
-    steps (up to 16), that is the gait. Raises MapError naming the state where a landing is not finite, and where the orbit fails or is unstable and
-    leads to none.
+    steps (up to 16), that is the gait. Raises MapError naming the state where a landing is not finite, and where the
+    orbit fails or is unstable and leads to none.
     """
     return Walker(step, dimension, noise, start, names, noise_names, phases, name, angles)
 
@@ -755,11 +755,11 @@ class FirstPassage(_ByState):
 
 class QuasiStationary(_ByState):
     """What survivors look like once the start is forgotten: their `distribution`, the `survival_weight` of each state
-    (largest 1), and the `failure_rate` per step, proven to lie from `lower` to `upper`; where some states do not lead to
-    others, that is proven of the group of states found to fade slowest, not that no other group fades more slowly. Distribution and weight are
-    estimates, without a proven bound: `residual` is the largest of |y Q - lambda y| and |Q x - lambda x|,
-    entry by entry, relative to the entry times the probability of leaving its state, and of the error that may be left
-    along other eigenvectors; `iterations` says how long it took."""
+    (largest 1), and the `failure_rate` per step, proven to lie from `lower` to `upper`; where some states do not lead
+    to others, that is proven of the group of states found to fade slowest, not that no other group fades more slowly.
+    Distribution and weight are estimates, without a proven bound: `residual` is the largest of |y Q - lambda y| and
+    |Q x - lambda x|, entry by entry, relative to the entry times the probability of leaving its state, and of the error
+    that may be left along other eigenvectors; `iterations` says how long it took."""
 
     def __init__(self, distribution, survival_weight, failure_rate, lower, upper, residual, iterations):
         super().__init__(dict(distribution=distribution, survival_weight=survival_weight, failure_rate=failure_rate,
