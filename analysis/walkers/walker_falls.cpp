@@ -21,7 +21,6 @@
 namespace metastable::analysis {
 namespace {
 
-constexpr int steps_of_a_fall = 6;
 constexpr double node_of_no_weight = 1e-6;  // share of a step's falls
 constexpr double score_spacing = 0.2, score_spacing_of_several = 0.6, score_reach = 8.5;
 constexpr std::uint64_t offsets_of_scores = 0x6000;
@@ -279,12 +278,15 @@ WalkerFalls how_it_falls(const markov::BatchMap& map, std::span<const double> st
   return falls;
 }
 
+std::vector<NamedNoise> noises_of(const WalkerSetting& setting) {
+  return {{"slope [deg]", setting.slope_deg, setting.slope_sd_deg}};
+}
+
 WalkerFalls how_it_falls(const WalkerSetting& setting, const WalkerStudy& study,
                          const markov::MeshStudyOptions& options) {
   const dynamics::WalkerMap map = setting.map();
   const dynamics::Gait gait = dynamics::find_gait(map.walker(), setting.slope_deg * degree);
-  return how_it_falls(batch_map(map), gait_state(setting, gait),
-                      {{"slope [deg]", setting.slope_deg, setting.slope_sd_deg}}, study.passage, options);
+  return how_it_falls(batch_map(map), gait_state(setting, gait), noises_of(setting), study.passage, options);
 }
 
 }  // namespace metastable::analysis

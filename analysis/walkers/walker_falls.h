@@ -10,6 +10,9 @@
 
 namespace metastable::analysis {
 
+/// Steps that are told, from the one that fails backwards.
+inline constexpr int steps_of_a_fall = 6;
+
 /// A node of the mesh.
 struct SectionPoint {
   std::vector<double> state;
@@ -41,6 +44,9 @@ struct NamedNoise {
 WalkerFalls how_it_falls(const markov::BatchMap& map, std::span<const double> start,
                          const std::vector<NamedNoise>& noises, const markov::MeshStudy& study,
                          const markov::MeshStudyOptions& options);
+
+/// Returns what a walker meets in each step.
+std::vector<NamedNoise> noises_of(const WalkerSetting& setting);
 
 /// Does the same for a walker that starts in its gait. @throws as study_walker
 WalkerFalls how_it_falls(const WalkerSetting& setting, const WalkerStudy& study,

@@ -20,7 +20,8 @@ namespace {
 constexpr double fewest_lines = 30;
 constexpr double shortest_burn_in = 30;  // steps, as memory that is not linear is seen in part only
 constexpr double refused_level = 1e-3;
-constexpr double widest = 4;  // upper over lower end of an interval that is given
+constexpr std::size_t walks_of_a_round = 1000;  // that failed, whose last steps are kept
+constexpr double widest = 4;                    // upper over lower end of an interval that is given
 
 /// One independent ensemble and what was seen of it.
 struct Round {
@@ -67,6 +68,7 @@ class Study {
       more = whole(std::min(wanted * taken, affordable), 2 * revolution);
     }
     judge();
+    if (options_.last_steps > 0) tell_failing();
     return std::move(found_);
   }
 
@@ -115,6 +117,7 @@ class Study {
           round.early.push_back(round.ensemble->advance());
           ++done, told();
         }
+        if (options_.last_steps > 0) round.ensemble->remember(options_.last_steps, walks_of_a_round);
       }
       for (std::uint64_t n = 0; n < more; ++n) {
         if (round.shares.size() % window_ == 0) round.ensemble->mark();
@@ -199,6 +202,20 @@ class Study {
     for (const Round& round : rounds_)
       for (const double weight : round.ensemble->lines()) sum += weight, squares += weight * weight;
     found_.lines = squares > 0 ? sum * sum / squares : 0;
+  }
+
+  // Rounds count alike: each has walked as many steps.
+  void tell_failing() {
+    for (const Round& round : rounds_) {
+      found_.failing.add(round.ensemble->failing());
+      for (int p = 0; p < map_.phases; ++p) {
+        const auto states = round.ensemble->states();
+        const auto weights = round.ensemble->weights();
+        found_.regime_states.insert(found_.regime_states.end(), states.begin(), states.end());
+        found_.regime_weights.insert(found_.regime_weights.end(), weights.begin(), weights.end());
+        if (p + 1 < map_.phases) round.ensemble->advance();
+      }
+    }
   }
 
   void judge() {

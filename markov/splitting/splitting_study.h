@@ -21,7 +21,8 @@ struct SplittingOptions {
   double tolerance = 0.05;   ///< wanted half-width of the 95 % interval of ln steps, > 0
   std::uint64_t most_calls = 400000000;  ///< rows that the map is asked for, in all
   std::uint64_t seed = 1;
-  int threads = 0;  ///< 0: all cores; the bits do not depend on it
+  int threads = 0;             ///< 0: all cores; the bits do not depend on it
+  std::size_t last_steps = 0;  ///< of what fails after the burn-in that are remembered
   /// It is called with the share of the work that is done, 0 until that can be foretold, from any thread but one at a
   /// time, and may throw to stop.
   std::function<void(double)> progress = {};
@@ -38,6 +39,9 @@ struct SplittingStudy {
   std::uint64_t pilot_calls = 0;
   double lines = 0;           ///< independent lines of descent that lead to failure: (sum w)^2 / sum w^2
   std::vector<double> rates;  ///< of each round
+  FailingWalks failing;       ///< of all rounds, some thousands at most; weights are even but for rounding
+  /// Holds states of the metastable regime [n x dimension] and their weights, of a revolution of phases.
+  std::vector<double> regime_states, regime_weights;
   /// Empty, or a sentence that says why `steps` must not be used.
   std::string disagreement;
 };

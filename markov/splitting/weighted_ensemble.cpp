@@ -13,7 +13,7 @@
 namespace metastable::markov {
 namespace {
 
-constexpr std::uint64_t noise_stream = 0x6000, choice_stream = 0x7000;
+constexpr std::uint64_t noise_stream = 0x6000, choice_stream = 0x7000, thinning_stream = 0x8000;
 
 }  // namespace
 
@@ -51,6 +51,11 @@ std::vector<double> WeightedEnsemble::lines() const {
   return all;
 }
 
+void WeightedEnsemble::remember(std::size_t steps, std::size_t most) {
+  memory_.emplace(steps, static_cast<std::size_t>(map_.dimension), static_cast<std::size_t>(map_.scores));
+  most_remembered_ = most;
+}
+
 void WeightedEnsemble::step() {
   const std::size_t n = size();
   next_.resize(states_.size());
@@ -72,6 +77,7 @@ void WeightedEnsemble::step() {
     for (std::size_t i = 0; i < n; ++i) words_[i] = random_words(seed_, noise_stream + (stream_ << 16), i, steps_)[0];
     checked_draw(map_, phase_, states_, words_, next_, failed_);
   }
+  if (memory_) memory_->begin_step(phase_, states_, scores_);
   calls_ += n;
   ++steps_;
   phase_ = (phase_ + 1) % map_.phases;
@@ -82,14 +88,17 @@ double WeightedEnsemble::advance() {
   const auto d = static_cast<std::size_t>(map_.dimension);
   double lost = 0, kept = 0;
   std::size_t left = 0;
+  std::vector<std::uint32_t> survivors;
   for (std::size_t i = 0; i < size(); ++i) {
     if (failed_[i]) {
       lost += weights_[i];
       ++failures_;
+      if (memory_) memory_->failed(i, weights_[i]);
       if (older_line_[i] < failed_of_line_.size()) failed_of_line_[older_line_[i]] += weights_[i];
       continue;
     }
     kept += weights_[i];
+    survivors.push_back(static_cast<std::uint32_t>(i));
     weights_[left] = weights_[i];
     line_[left] = line_[i];
     older_line_[left] = older_line_[i];
@@ -100,7 +109,13 @@ double WeightedEnsemble::advance() {
   const double share = lost / (lost + kept);
   for (double& weight : weights_) weight /= kept;
   place();
-  resample();
+  std::vector<std::uint32_t> places = resample();
+  if (memory_) {
+    for (std::uint32_t& at : places) at = survivors[at];
+    memory_->end_step(std::move(places));
+    if (memory_->walks().size() > 2 * most_remembered_)
+      memory_->walks().thin(most_remembered_, uniforms(seed_, thinning_stream + (stream_ << 16), 0, steps_)[0]);
+  }
   return share;
 }
 
@@ -120,8 +135,8 @@ void WeightedEnsemble::place() {
 }
 
 /// Chooses in every bin as many replicas as it is to have, at evenly spaced places along the weights of those it holds,
-/// in the order of their levels.
-void WeightedEnsemble::resample() {
+/// in the order of their levels. Returns the places that they had.
+std::vector<std::uint32_t> WeightedEnsemble::resample() {
   const auto d = static_cast<std::size_t>(map_.dimension);
   std::vector<std::size_t> order(size());
   std::iota(order.begin(), order.end(), std::size_t{0});
@@ -131,7 +146,7 @@ void WeightedEnsemble::resample() {
   const std::size_t each = std::max<std::size_t>(2, replicas_ / occupied);
   std::vector<double> states, weights, levels;
   std::vector<int> bins;
-  std::vector<std::uint32_t> line, older;
+  std::vector<std::uint32_t> line, older, places;
   for (std::size_t first = 0, last = 0; first < order.size(); first = last) {
     double whole = 0;
     for (; last < order.size() && bins_[order[last]] == bins_[order[first]]; ++last) whole += weights_[order[last]];
@@ -145,7 +160,7 @@ void WeightedEnsemble::resample() {
       for (; place < reached || (k + 1 == last && weights.size() % each != 0 && place < reached + 1e-9); place += 1) {
         states.insert(states.end(), &states_[i * d], &states_[i * d] + d);
         weights.push_back(share), levels.push_back(levels_[i]), bins.push_back(bins_[i]);
-        line.push_back(line_[i]), older.push_back(older_line_[i]);
+        line.push_back(line_[i]), older.push_back(older_line_[i]), places.push_back(static_cast<std::uint32_t>(i));
       }
     }
   }
@@ -154,6 +169,7 @@ void WeightedEnsemble::resample() {
   for (double& weight : weights) weight /= sum;
   states_ = std::move(states), weights_ = std::move(weights), levels_ = std::move(levels), bins_ = std::move(bins);
   line_ = std::move(line), older_line_ = std::move(older);
+  return places;
 }
 
 }  // namespace metastable::markov

@@ -4,10 +4,12 @@
 
 #include <cstdint>
 #include <functional>
+#include <optional>
 #include <span>
 #include <vector>
 
 #include "markov/mesh/batch_map.h"
+#include "markov/splitting/failing_walks.h"
 
 namespace metastable::markov {
 
@@ -56,10 +58,15 @@ class WeightedEnsemble {
   std::vector<double> lines() const;
   std::uint64_t failures() const { return failures_; }  ///< replicas that failed
 
+  /// Remembers from now on the last steps of what fails, of some `most` to twice as many walks.
+  void remember(std::size_t steps, std::size_t most);
+  /// Returns them. @pre remember() was called
+  const FailingWalks& failing() const { return memory_->walks(); }
+
  private:
   void step();
   void place();
-  void resample();
+  std::vector<std::uint32_t> resample();
 
   const BatchMap& map_;
   std::size_t replicas_;
@@ -74,6 +81,8 @@ class WeightedEnsemble {
   std::vector<double> scores_, next_;
   std::vector<std::uint64_t> words_;
   std::vector<std::uint8_t> failed_;
+  std::optional<WalkMemory> memory_;
+  std::size_t most_remembered_ = 0;
 };
 
 }  // namespace metastable::markov

@@ -109,7 +109,7 @@ WalkerMethod walker_method(const Options& o) {
     const bool meshes = method != WalkerMethod::splitting;
     if (o.given("tolerance") && method == WalkerMethod::mesh)
       throw std::invalid_argument("--tolerance: has no meaning under --method mesh");
-    for (const char* own : {"spacing", "memory", "simulated-steps", "how-it-fails"})
+    for (const char* own : {"spacing", "memory", "simulated-steps"})
       if (!meshes && o.given(own))
         throw std::invalid_argument(fmt::format("--{}: has no meaning under --method splitting", own));
     return method;

@@ -7,6 +7,7 @@
 #include <stdexcept>
 
 #include "analysis/walker_model/walk_folder.h"
+#include "analysis/walkers/split_falls.h"
 #include "analysis/walkers/walker_falls.h"
 #include "markov/mesh/noise_frame.h"
 #include "reports/commands/sweep_file.h"
@@ -73,14 +74,18 @@ WalkerAnswer answer_walker_steps(const WalkerRequest& request, const BeginPart& 
         return &answer.studies.front().passage;
       },
       [&] {
-        return agreed_splitting(setting.describe(), request.splitting, begin("splitting"),
+        markov::SplittingOptions splitting = request.splitting;
+        splitting.last_steps = request.how_it_fails ? analysis::steps_of_a_fall : 0;
+        return agreed_splitting(setting.describe(), splitting, begin("splitting"),
                                 [&](const auto& options) { return analysis::split_walker(setting, options); });
       });
-  if (request.how_it_fails && !answer.studies.empty()) {
-    const Tell tell = begin("how it fails");
-    tell(0, "");
-    answer.moments = analysis::how_it_falls(setting, answer.studies.front(), request.study).moments;
-  }
+  if (!request.how_it_fails) return answer;
+  const Tell tell = begin("how it fails");
+  tell(0, "");
+  answer.moments = answer.studies.empty()
+                       ? analysis::how_it_falls(analysis::batch_map(setting.map()), analysis::noises_of(setting),
+                                                answer.splitting->passage)
+                       : analysis::how_it_falls(setting, answer.studies.front(), request.study).moments;
   return answer;
 }
 
@@ -93,7 +98,7 @@ WalkerAnswer answer_walker_compare(const WalkerRequest& request, const BeginPart
 
 std::string walker_answer_json(const WalkerRequest& request, const WalkerAnswer& answer) {
   if (request.settings.size() > 1) return walkers_json(request.settings, answer.studies, walker_provenance(request));
-  if (answer.studies.empty()) return splitting_json(*answer.splitting, walker_provenance(request));
+  if (answer.studies.empty()) return splitting_json(*answer.splitting, answer.moments, walker_provenance(request));
   const std::string json =
       walker_json(request.settings.front(), answer.studies.front(), answer.moments, walker_provenance(request));
   return answer.splitting ? with_splitting_json(json, answer.splitting->passage) : json;
@@ -101,8 +106,7 @@ std::string walker_answer_json(const WalkerRequest& request, const WalkerAnswer&
 
 std::string walker_answer_text(const WalkerRequest& request, const WalkerAnswer& answer, std::size_t width) {
   if (request.settings.size() > 1) return walkers_text(request.settings, answer.studies);
-  if (answer.studies.empty())
-    return splitting_text(*answer.splitting) + (request.how_it_fails ? "How it fails is told from a mesh only.\n" : "");
+  if (answer.studies.empty()) return splitting_text(*answer.splitting, answer.moments, width);
   const std::string text = walker_text(request.settings.front(), answer.studies.front(), answer.moments, width);
   return answer.splitting ? with_splitting_text(text, answer.splitting->passage) : text;
 }

@@ -8,6 +8,7 @@
 #include <optional>
 #include <stdexcept>
 
+#include "analysis/walkers/split_falls.h"
 #include "analysis/walkers/walker_falls.h"
 #include "analysis/walkers/walker_study.h"
 #include "analysis/walkers/walker_trials.h"
@@ -177,21 +178,23 @@ py::dict study_map(const py::dict& fields, const py::dict& options, const std::s
           return &found.passage;
         },
         [&] {
+          asked.splitting.last_steps = how_it_fails ? analysis::steps_of_a_fall : 0;
           return agreed_splitting(python.name, asked.splitting, begin("splitting"), [&](const auto& options) {
             return markov::splitting_study(map, python.start, options);
           });
         });
-    if (!how_it_fails || !on_mesh) return;
+    if (!how_it_fails) return;
     call.tell(0, "how it fails");
     std::vector<analysis::NamedNoise> noises;
     for (const std::string& name : python.noise_names) noises.push_back({name});
-    moments = analysis::how_it_falls(map, python.start, noises, found.passage, asked.mesh).moments;
+    moments = on_mesh ? analysis::how_it_falls(map, python.start, noises, found.passage, asked.mesh).moments
+                      : analysis::how_it_falls(map, noises, splitting->passage);
   });
   const Provenance provenance{command, python.name, asked.mesh.seed, version()};
   py::dict arrays;
   arrays["survival"] = survival_array(on_mesh ? found.passage.survival : splitting->passage.survival);
   if (!on_mesh)
-    return answer(splitting_json(*splitting, provenance), splitting_text(*splitting),
+    return answer(splitting_json(*splitting, moments, provenance), splitting_text(*splitting, moments, line_width),
                   to_html(splitting_table(*splitting, provenance)), arrays);
   std::string json = map_json(found, moments, provenance), text = map_text(found, moments, line_width);
   if (splitting) {

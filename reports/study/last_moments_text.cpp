@@ -27,7 +27,7 @@ std::vector<Cell> profile_row(const std::string& name, const StepProfile& profil
   std::vector<Cell> row{name};
   for (const Estimate& one : profile.state) row.emplace_back(one);
   for (const Estimate& one : profile.noise) row.emplace_back(one);
-  row.emplace_back(profile.bound_to_fail);
+  if (!std::isnan(profile.bound_to_fail)) row.emplace_back(profile.bound_to_fail);
   return row;
 }
 
@@ -41,15 +41,21 @@ Json spreads_json(const std::vector<std::string>& names, const std::vector<Estim
 Json profile_json(const LastMoments& moments, const StepProfile& profile) {
   return {{"state", spreads_json(moments.state_names, profile.state)},
           {"noise", spreads_json(moments.noise_names, profile.noise)},
-          {"bound_to_fail", profile.bound_to_fail}};
+          {"bound_to_fail", std::isnan(profile.bound_to_fail) ? Json(nullptr) : Json(profile.bound_to_fail)}};
 }
 
 std::string numbers(const std::vector<double>& values) { return fmt::format("{:.4g}", fmt::join(values, ", ")); }
 
+// Says whether walks tell it, who do not know what they are bound to.
+bool followed(const LastMoments& moments) { return std::isnan(moments.regime.bound_to_fail); }
+
 std::string path_text(const LastMoments& moments, const std::string& phase) {
   std::vector<std::string> names = moments.state_names;
   names.insert(names.end(), moments.noise_names.begin(), moments.noise_names.end());
-  std::string text = fmt::format("The most likely last steps ({}):\n", fmt::join(names, ", "));
+  std::string text = fmt::format("{} ({}):\n",
+                                 followed(moments) ? "Of the walks that failed, the one of least noise"
+                                                   : "The most likely last steps",
+                                 fmt::join(names, ", "));
   for (const analysis::PathStep& step : moments.likeliest) {
     const std::string leg = moments.by_phase.size() > 1 ? fmt::format("{} {}: ", phase, step.phase) : "";
     const std::string met = step.noise.empty() ? "" : " meets " + numbers(step.noise);
@@ -64,13 +70,16 @@ Table last_moments_table(const LastMoments& moments, const std::string& id, cons
                          const Provenance& provenance) {
   Table table{.id = id,
               .title = where.empty() ? "How it fails: the last steps" : "The last steps, " + where,
-              .notes = {"Medians with the middle 90 % of what a step begins with and meets. Bound to fail: the mean "
-                        "chance of failing before being back in the middle of the metastable regime."},
+              .notes = {"Medians with the middle 90 % of what a step begins with and meets."},
               .columns = {{"step"}},
               .provenance = provenance};
   for (const auto* names : {&moments.state_names, &moments.noise_names})
     for (const std::string& name : *names) table.columns.push_back({.name = name, .level = 90});
-  table.columns.push_back({.name = "bound to fail", .digits = 2});
+  if (!followed(moments)) {
+    table.notes[0] +=
+        " Bound to fail: the mean chance of failing before being back in the middle of the metastable regime.";
+    table.columns.push_back({.name = "bound to fail", .digits = 2});
+  }
   for (std::size_t k = moments.last.size(); k-- > 0;) table.rows.push_back(profile_row(step_name(k), moments.last[k]));
   table.rows.push_back(profile_row("all steps of the regime", moments.regime));
   return table;

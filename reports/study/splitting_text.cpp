@@ -6,6 +6,7 @@
 #include <utility>
 #include <vector>
 
+#include "reports/study/last_moments_text.h"
 #include "reports/study/walker_text.h"
 
 namespace metastable::reports {
@@ -61,10 +62,12 @@ std::string joined(const Lines& lines) {
 
 }  // namespace
 
-std::string splitting_json(const SplittingAnswer& answer, const Provenance& provenance) {
+std::string splitting_json(const SplittingAnswer& answer, const std::optional<analysis::LastMoments>& moments,
+                           const Provenance& provenance) {
   Json json = {{"setting", answer.name}, {"method", "splitting"}, {"status", "rounds_agree"}};
   json["no_mesh"] = answer.no_mesh.empty() ? Json(nullptr) : Json(answer.no_mesh);
   json.update(study_json(answer.passage));
+  if (moments) json["how_it_fails"] = Json::parse(last_moments_json(*moments));
   json["provenance"] = {{"command", provenance.command},
                         {"settings", provenance.settings},
                         {"seed", provenance.seed},
@@ -72,7 +75,11 @@ std::string splitting_json(const SplittingAnswer& answer, const Provenance& prov
   return json.dump(2) + "\n";
 }
 
-std::string splitting_text(const SplittingAnswer& answer) { return answer.name + "\n\n" + joined(lines_of(answer)); }
+std::string splitting_text(const SplittingAnswer& answer, const std::optional<analysis::LastMoments>& moments,
+                           std::size_t width) {
+  const std::string text = answer.name + "\n\n" + joined(lines_of(answer));
+  return moments ? text + "\n" + last_moments_text(*moments, "phase", width) : text;
+}
 
 Table splitting_table(const SplittingAnswer& answer, const Provenance& provenance) {
   Table table{.id = "steps", .title = answer.name, .columns = {{"quantity"}, {"value"}}, .provenance = provenance};

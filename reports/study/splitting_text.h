@@ -31,8 +31,11 @@ markov::SplittingStudy agreed_splitting(const std::string& name, markov::Splitti
   return study;
 }
 
-std::string splitting_json(const SplittingAnswer& answer, const Provenance& provenance);
-std::string splitting_text(const SplittingAnswer& answer);
+/// @param moments  how it fails, where that was asked
+std::string splitting_json(const SplittingAnswer& answer, const std::optional<analysis::LastMoments>& moments,
+                           const Provenance& provenance);
+std::string splitting_text(const SplittingAnswer& answer, const std::optional<analysis::LastMoments>& moments,
+                           std::size_t width);
 Table splitting_table(const SplittingAnswer& answer, const Provenance& provenance);
 
 /// Returns the JSON and the text of a mesh's study with splitting beside it, under the key "splitting".

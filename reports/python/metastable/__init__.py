@@ -239,7 +239,7 @@ def study(setting, *, method=None, cells=None, samples=None, tolerance=None, seq
     memory_gb        most memory of the meshes; None: 3
 
     Of all:
-    how_it_fails     the last steps before failure as well
+    how_it_fails     the last steps before failure as well, from the chain or from the walks that splitting sees fail
     seed             the same seed gives the same numbers, on any number of threads (0: all cores)
     time_limit       seconds after which a RuntimeError says how far the work was; None: 900. It changes no number
     progress         None: shown on a terminal and in a notebook; True, False, or a function of the share of the time

@@ -125,7 +125,8 @@ def _steps(value, interval):
 
 class HowItFails(Record):
     """The last steps before failure: `last_steps` with medians and middle 90 % of states and noise, and `bound_to_fail`,
-    the chance of failing before being back in the middle of the metastable regime; `regime`, all steps beside them."""
+    the chance of failing before being back in the middle of the metastable regime (None by splitting); `regime`, all
+    steps beside them; `most_likely_path`, by splitting the walk of least noise among those that failed."""
 
     def _rows(self):
         rows = []
@@ -140,8 +141,16 @@ class HowItFails(Record):
 
     def _draw(self, ax):
         ax = _frames.axes(ax)
-        ax.plot([-step.steps_before_the_last for step in self.last_steps],
-                [step.bound_to_fail for step in self.last_steps], "o-", label="before a failure")
+        before = [-step.steps_before_the_last for step in self.last_steps]
+        if self.regime.bound_to_fail is None:
+            for name in self.regime.state.keys():
+                low, high = self.regime.state[name].middle_90
+                ax.plot(before, [(step.state[name].median - self.regime.state[name].median) / (high - low)
+                                 for step in self.last_steps], "o-", label=name)
+            ax.set(xlabel="steps before the one that fails", ylabel="median off the regime's [its middle 90 %]")
+            ax.legend()
+            return ax
+        ax.plot(before, [step.bound_to_fail for step in self.last_steps], "o-", label="before a failure")
         ax.axhline(self.regime.bound_to_fail, linestyle="--", label="all steps of the regime")
         ax.set(xlabel="steps before the one that fails", ylabel="chance of failing before coming back", yscale="log")
         ax.legend()

@@ -143,7 +143,10 @@ class Steps(unittest.TestCase):
         with self.assertRaisesRegex(metastable.InputError, "6 dimensions, where meshes hold 1 to 4; method splitting"):
             walker.study()
         for method in ("splitting", "auto"):
-            study = walker.study(method=method, tolerance=0.3)
+            study = walker.study(method=method, tolerance=0.3, how_it_fails=True)
+            last = study.how_it_fails.last_steps[0]
+            self.assertIsNone(last.bound_to_fail)
+            self.assertGreater(max(last.state[f"x{k}"].median for k in range(1, 7)), 0.5)  # all are 0 in the regime
             low, high = study.expected_steps.interval_95
             self.assertLess(abs(np.log(study.expected_steps.value / 1140.3)), np.log(high / low))
             self.assertEqual(study.status, "rounds_agree")
