@@ -70,7 +70,7 @@ std::vector<ContactLikelihood::Piece> ContactLikelihood::region_of_rest(const Su
       if (!pieces.empty() && pieces.back().column == j && pieces.back().friction_to == from)
         pieces.back().friction_to = to;
       else
-        pieces.push_back({restitution_at(j), from, 0, to, j});
+        pieces.push_back({from, to, j});
     }
     if (column[rows - 1] < barrier && !pieces.empty())
       pieces.back().friction_to = std::numeric_limits<double>::infinity();
@@ -87,7 +87,7 @@ class ContactLikelihood::LevelCurve {
         phase_(transition.phase),
         level_(*transition.landing - map.stance(transition.phase).gain) {}
 
-  std::vector<Piece> pieces(const Surface& surface, const std::vector<double>& after) {
+  CurvePoints points(const Surface& surface, const std::vector<double>& after) {
     const std::vector<double>& mu = surface.friction;
     const std::size_t rows = mu.size();
     for (std::size_t j = 0; j + 1 < columns; ++j)
@@ -102,7 +102,7 @@ class ContactLikelihood::LevelCurve {
         pass_through(a, b, c);
         pass_through(b, c, d);
       }
-    return std::move(pieces_);
+    return std::move(points_);
   }
 
  private:
@@ -150,14 +150,14 @@ class ContactLikelihood::LevelCurve {
     const auto [gradient, shift_x, shift_y] = bend(a, b, c, (x1 + x2) / 2, (y1 + y2) / 2);
     const double weight = std::hypot(x2 - x1, y2 - y1) / gradient / 2;
     for (const double at : {0.5 - gauss, 0.5 + gauss})
-      pieces_.push_back({x1 + at * (x2 - x1) + shift_x, y1 + at * (y2 - y1) + shift_y, weight, 0, 0});
+      points_.add(x1 + at * (x2 - x1) + shift_x, y1 + at * (y2 - y1) + shift_y, weight);
   }
 
   const dynamics::WheelMap& map_;
   double state_;
   int phase_;
   double level_;  // of omega+^2
-  std::vector<Piece> pieces_;
+  CurvePoints points_;
 };
 
 ContactLikelihood::ContactLikelihood(const std::vector<dynamics::WheelMap>& maps,
@@ -171,9 +171,12 @@ ContactLikelihood::ContactLikelihood(const std::vector<dynamics::WheelMap>& maps
     const dynamics::WheelMap& map = maps[t.condition];
     const Surface& surface = surfaces.at({t.condition, t.phase});
     const std::vector<double> after = surface.after(t.state);
-    all[number] = {t.landing.has_value(), t.rested,
-                   t.landing ? LevelCurve(map, t).pieces(surface, after)
-                             : region_of_rest(surface, after, map.stance(t.phase).barrier)};
+    all[number].landing = t.landing.has_value();
+    all[number].rested = t.rested;
+    if (t.landing)
+      all[number].curve = LevelCurve(map, t).points(surface, after);
+    else
+      all[number].pieces = region_of_rest(surface, after, map.stance(t.phase).barrier);
   });
   keep_possible(std::move(all));
 }
@@ -181,7 +184,7 @@ ContactLikelihood::ContactLikelihood(const std::vector<dynamics::WheelMap>& maps
 void ContactLikelihood::keep_possible(std::vector<Observed> all) {
   for (Observed& observed : all) {
     // A survivor whose region of rest is empty is certain, not impossible.
-    if (observed.pieces.empty() && (observed.landing || observed.rested)) {
+    if (observed.landing ? observed.curve.size() == 0 : observed.rested && observed.pieces.empty()) {
       ++impossible_;
       continue;
     }
@@ -191,16 +194,10 @@ void ContactLikelihood::keep_possible(std::vector<Observed> all) {
 }
 
 ContactLikelihood::Value ContactLikelihood::density(const Observed& observed, const ContactParameters& p) {
-  double sum = 0, u1 = 0, u2 = 0, v1 = 0, v2 = 0;  // moments along the curve
   const double a = 1 / p[1], b = 1 / p[3];
-  for (const Piece& piece : observed.pieces) {
-    const double u = (piece.restitution - p[0]) * a, v = (piece.friction - p[2]) * b;
-    const double share = piece.weight * std::exp(-0.5 * (u * u + v * v));
-    sum += share;
-    u1 += share * u, u2 += share * u * u;
-    v1 += share * v, v2 += share * v * v;
-  }
-  return {a * b / (2 * std::numbers::pi) * sum, {a * u1 / sum, a * (u2 / sum - 1), b * v1 / sum, b * (v2 / sum - 1)}};
+  const CurveMoments m = curve_moments(observed.curve, {p[0], a, p[2], b});
+  return {a * b / (2 * std::numbers::pi) * m.sum * std::exp(-0.5 * m.nearest),
+          {a * m.u / m.sum, a * (m.uu / m.sum - 1), b * m.v / m.sum, b * (m.vv / m.sum - 1)}};
 }
 
 // A function that is linear between the columns has its mean over eta as the sum of its values there by these weights,

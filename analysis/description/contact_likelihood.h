@@ -6,6 +6,7 @@
 #include <span>
 #include <vector>
 
+#include "analysis/description/curve_moments.h"
 #include "analysis/description/landings.h"
 #include "dynamics/numerics/truncated_normal.h"
 
@@ -37,14 +38,16 @@ class ContactLikelihood {
   std::size_t impossible() const { return impossible_; }
 
  private:
-  /// Holds a curve's point and its share of length / |grad x'|, or a region's column of eta and mu from and to.
+  /// Holds a region's column of eta, and mu from and to.
   struct Piece {
-    double restitution, friction, weight, friction_to;
+    double friction, friction_to;
     std::size_t column;
   };
-  /// One transition: the curve that leads to its landing, or the region that rests.
+  /// One transition: the curve that leads to its landing, its points weighted by length / |grad x'|, or the region that
+  /// rests.
   struct Observed {
     bool landing, rested;
+    CurvePoints curve;
     std::vector<Piece> pieces;
   };
   /// Holds a probability or density, and its logarithm's derivatives.
