@@ -232,7 +232,10 @@ void say_what_closes(std::vector<std::string>& s, const Diagnosis& d) {
 void say_machine_steps(std::vector<std::string>& s, const Diagnosis& d) {
   for (const MachineSteps& machine : d.shrinkage.steps.machine) {
     if (!(machine.steps.lower > 0)) continue;
-    const std::string where = machine.where.empty() ? "" : " " + machine.where;
+    // Trials of a machine end after some steps, and their first ones may fail more seldom than later ones.
+    const std::string where = !machine.where.empty()       ? " " + machine.where
+                              : d.data.step_name == "step" ? " in trials like these"
+                                                           : "";
     if (machine.at_least) {
       s.push_back(fmt::format("This machine takes at least {} {}s before failure{} (95 %).",
                               format_number(machine.steps.lower, NumberFormat::general, 2), d.data.step_name, where));

@@ -42,6 +42,7 @@ struct MachineSensor {
 struct MachineLaunch {
   std::string state;
   double mean = 0, sd = 0;
+  bool assumed = false;  ///< nobody stated the sd: walks that are drawn start at the mean
 };
 
 /// One call of a step map: `rows` states at once. A value (see Machine::value_names()) is one number for all rows, or

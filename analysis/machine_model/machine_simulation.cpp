@@ -98,7 +98,8 @@ Walking Walker::launched(std::size_t trial) const {
                   Eigen::VectorXd::Zero(static_cast<Eigen::Index>(machine_.observe.size())), false};
   for (std::size_t l = 0; l < machine_.launches.size(); ++l)
     walking.point[static_cast<Eigen::Index>(machine_.state_index(machine_.launches[l].state))] =
-        machine_.launches[l].mean + machine_.launches[l].sd * draws.normal(0, launch + l);
+        machine_.launches[l].mean +
+        (machine_.launches[l].assumed ? 0 : machine_.launches[l].sd * draws.normal(0, launch + l));
   for (std::size_t j = 0; j < machine_.observe.size(); ++j) {
     const auto at = static_cast<Eigen::Index>(j);
     walking.errors[at] = draws.normal(0, errors + j);

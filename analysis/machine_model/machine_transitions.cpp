@@ -87,9 +87,10 @@ class MachineTransitions : public TransitionModel {
   }
   std::pair<double, double> rests() const override {
     double at_risk = 0, failed = 0;
-    for (const Event& e : events_) {
-      at_risk += e.rested.has_value();
-      failed += e.rested.value_or(false);
+    for (const MachineTrial& trial : runs_.trials) {
+      if (!trial.outcome) return {0, 0};
+      at_risk += static_cast<double>(steps_of(trial));
+      failed += *trial.outcome == MachineOutcome::failed;
     }
     return {at_risk, failed};
   }

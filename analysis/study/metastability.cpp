@@ -438,7 +438,7 @@ std::string_view method_name(Method method) {
 Method method_from_name(std::string_view name) {
   for (const Method method : {Method::sampled, Method::integrated})
     if (name == method_name(method)) return method;
-  throw std::invalid_argument(fmt::format("method: '{}' is neither 'sampled' nor 'integrated'", name));
+  throw std::invalid_argument(fmt::format("method: '{}' is neither 'sampled' nor 'integrated', which wheels have", name));
 }
 
 std::string status_text(Status status) {

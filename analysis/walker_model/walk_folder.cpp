@@ -27,7 +27,7 @@ constexpr double angle_error = 0.0005, compass_rate_error = 0.005, simplest_rate
 constexpr double unknown_launch = 0.3;  // sd of a first value that is not measured, in those of the gait
 constexpr std::int64_t most_steps = 1'000'000'000;
 constexpr dynamics::Range angles{.low = 0, .high = 1.5707963267948966, .low_open = true, .high_open = true};
-constexpr dynamics::Range rates{.low = -1000, .high = 1000};
+constexpr dynamics::Range rates{.low = -30, .high = 30};  // [rad/s]: ten times what gaits have; degrees are beyond
 
 std::string file_in(const ExperimentSource& source, const char* name) {
   return (std::filesystem::path(source.folder) / name).string();
@@ -101,6 +101,8 @@ class WalkReader {
     std::vector<MachineRow>& rows = runs_.trials.back().rows;
     if (step != static_cast<std::int64_t>(rows.size()) + 1)
       return csv.refuse(step_, fmt::format("{} is not due: step {} of trial {} is", step, rows.size() + 1, key.second));
+    if (!rows.empty() && row.time <= rows.back().time)
+      return csv.refuse(time_, fmt::format("{} does not come after {} of the step before", row.time, rows.back().time));
     rows.push_back(std::move(row));
   }
 
@@ -240,12 +242,12 @@ std::optional<Walks> parse_walks(const ExperimentSource& source) {
   auto machine = std::make_shared<Machine>(walker_machine(statement));
   for (const WalkDescription::Column& column : told->columns)
     machine->observe.push_back({column.state, column.sd, column.correlation});
-  // A value that a trial's first row lacks is drawn from around the gait's.
+  // A value that a trial's first row lacks is around the gait's.
   const dynamics::TwoLinkWalker walker = statement.setting.map().walker();
   const std::vector<double> gait =
       gait_state(statement.setting, dynamics::find_gait(walker, statement.setting.slope_deg * degree));
   for (std::size_t s = 0; s < machine->states.size(); ++s)
-    machine->launches.push_back({machine->states[s], gait[s], unknown_launch * std::abs(gait[s])});
+    machine->launches.push_back({machine->states[s], gait[s], unknown_launch * std::abs(gait[s]), true});
   Walks walks{told->title, {}, {}};
   WalkReader(source, *machine, walks.runs, defects).read();
   defects.check();

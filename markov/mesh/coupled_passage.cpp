@@ -101,9 +101,9 @@ class Aggregation {
       if (visits[i] > 0) visits[i] *= to[class_[i]] / mass_[class_[i]];
   }
 
-  /// Returns the chance of failing in a step of those that have walked on for ever, by inverse iteration: its expected
-  /// visits are those of the slowest class in the end.
-  double last_rate() const {
+  /// Returns the shares of the classes among those that have walked on for ever, by inverse iteration of the small
+  /// chain.
+  std::vector<double> last_shares() const {
     std::vector<double> x(classes_);
     const double all = std::accumulate(mass_.begin(), mass_.end(), 0.0);
     for (std::size_t c = 0; c < classes_; ++c) x[c] = mass_[c] / all;
@@ -116,10 +116,15 @@ class Aggregation {
         x[c] = y[c] / sum;
         if (mass_[c] > 0) fails += x[c] * kill_[c] / mass_[c];
       }
-      if (std::abs(fails - rate) <= settled_rate * fails) return fails;
+      if (std::abs(fails - rate) <= settled_rate * fails) break;
       rate = fails;
     }
-    return rate;
+    return x;
+  }
+
+  /// Returns the chance of failing in a step, of the shape that was read.
+  double failure_rate() const {
+    return std::accumulate(kill_.begin(), kill_.end(), 0.0) / std::accumulate(mass_.begin(), mass_.end(), 0.0);
   }
 
  private:
@@ -128,6 +133,32 @@ class Aggregation {
   std::vector<std::uint32_t> class_;
   std::vector<double> kill_, leave_, flow_, mass_;
 };
+
+/// Returns the chance of failing in a step of those that have walked on for ever. Their shape within the classes is
+/// found by products, from `x` on, the classes' shares from the small chain that it makes.
+double last_rate(const Mesh& mesh, Aggregation& aggregation, std::vector<double> x, int& products) {
+  std::vector<double> led(x.size());
+  double rate = 0, change = 0;
+  const int most = products + product_limit;
+  for (int still = 0; still < still_rounds;) {
+    if (products >= most)
+      throw ConvergenceError("mesh", change, "the failure rate of its gaits still changes after 20000 products");
+    for (int k = 0; k < smoothing; ++k) {
+      mesh.apply_left(x, led);
+      double sum = 0;
+      for (std::size_t i = 0; i < x.size(); ++i) sum += x[i] = 0.5 * (x[i] + led[i]);
+      for (double& one : x) one /= sum;
+    }
+    products += smoothing;
+    aggregation.read(x);
+    const double found = aggregation.failure_rate();
+    aggregation.scale(x, aggregation.last_shares());
+    change = std::abs(found - rate) / found;
+    still = change <= round_still ? still + 1 : 0;
+    rate = found;
+  }
+  return rate;
+}
 
 /// Does a damped step of y = b + y Q: half of it, so that what alternates dies out.
 void smooth(const Mesh& mesh, std::span<const double> start, std::vector<double>& y, std::vector<double>& led) {
@@ -214,7 +245,7 @@ CoupledPassage coupled_passage(const Mesh& mesh, std::span<const double> start, 
   passage.steps_upper = last;
   passage.steps_lower = std::accumulate(lower.begin(), lower.end(), 0.0);
   passage.steps = std::sqrt(passage.steps_upper * passage.steps_lower);
-  passage.failure_rate = aggregation.last_rate();
+  passage.failure_rate = last_rate(mesh, aggregation, y, passage.products);
   found.share.assign(gaits, 0.0);
   for (std::size_t i = 0; i < y.size(); ++i) found.share[gait[i]] += y[i] / last;
   passage.visits = std::move(y);

@@ -24,7 +24,8 @@ std::vector<std::uint32_t> gait_classes(const Mesh& mesh, const std::vector<std:
 /// the form they have in the first gait, or over 4000 steps where they do not. `first_rate` is the chance of failing in
 /// a step after that.
 /// @param gait  of each node, below `gaits`
-/// @throws ConvergenceError if visits still change after 20000 products; std::domain_error where some class never fails
+/// @throws ConvergenceError if visits, or then the rate, still change after 20000 products; std::domain_error where
+/// some class never fails
 struct CoupledPassage {
   MeshPassage passage;
   double first_rate = 0;

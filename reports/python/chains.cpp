@@ -92,6 +92,7 @@ HeldChain chain_of(const Index& starts, const Index& columns, const Number& valu
   if (!(memory_gb > 0)) throw std::invalid_argument(fmt::format("memory_gb: {:g}, more than 0 expected", memory_gb));
   if (!(time_limit > 0)) throw std::invalid_argument(fmt::format("time_limit: {:g}, more than 0 expected", time_limit));
   const auto n = static_cast<std::size_t>(kill.size());
+  if (n == 0) throw std::invalid_argument("chain: it has 0 states, one or more expected");
   std::vector<std::size_t> row_start{0};
   std::vector<std::uint32_t> column;
   std::vector<double> value, sums(kill.data(), kill.data() + n);

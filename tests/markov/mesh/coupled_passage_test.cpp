@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include "markov/mesh/other_gaits.h"
+#include "markov/passage/quasi_stationary.h"
 #include "tests/markov/mesh/maps.h"
 
 namespace metastable::markov {
@@ -33,6 +34,8 @@ TEST(CoupledPassage, IsWhatEliminationSaysOfItsChain) {
     EXPECT_LT(bracket, 1e-3) << gaits.sd;
     EXPECT_NEAR(coupled.passage.steps_lower / steps, 1, 1e-6 + bracket) << gaits.sd;
     EXPECT_NEAR(coupled.share[0] + coupled.share[1], 1, 1e-6);
+    const double rate = quasi_stationary(ChainSolver(mesh.chain())).failure_rate;
+    EXPECT_NEAR(coupled.passage.failure_rate / rate, 1, 1e-6 + 3 * bracket) << gaits.sd;
     EXPECT_GE(bracket, 0);
   }
 }
