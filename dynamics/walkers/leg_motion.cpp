@@ -10,21 +10,29 @@
 namespace metastable::dynamics {
 namespace {
 
-constexpr int order = 16;
-constexpr std::size_t width = legs_at_once;
-/// Holds four walkers side by side.
-using Lanes = double __attribute__((vector_size(width * sizeof(double))));
+constexpr int order = 12;
+constexpr std::size_t vector_width = 4, vectors = 2, width = vectors * vector_width;
+/// Holds a number of each of four walkers side by side.
+using Lanes = double __attribute__((vector_size(vector_width * sizeof(double))));
 
 /// Holds a quantity's Taylor coefficients.
 using Series = std::array<Lanes, order + 1>;
 
+/// Holds 1 / k.
+constexpr std::array<double, order + 1> shares = [] {
+  std::array<double, order + 1> list{};
+  for (std::size_t k = 1; k <= order; ++k) list[k] = 1 / static_cast<double>(k);
+  return list;
+}();
+
 /// Holds angles, rates, and the sines and cosines that the equations need, of four walkers as series in time.
 struct Motion {
-  Series theta, psi, omega, nu;                   ///< stance and swing angle, their rates
-  Series sin_theta, cos_theta;                    ///< of theta - gamma
-  Series sin_psi, cos_psi;                        ///< of psi - gamma
-  Series sin_between, cos_between, between;       ///< of theta - psi; omega - nu
-  Series omega_squared, nu_squared, alpha, beta;  ///< beta, alpha: the angular accelerations
+  Series theta, psi, omega, nu;     ///< stance and swing angle, their rates
+  Series sin_theta, cos_theta;      ///< of theta - gamma
+  Series sin_psi, cos_psi;          ///< of psi - gamma
+  Series sin_between, cos_between;  ///< of theta - psi
+  Series between, product;          ///< omega - nu; omega nu
+  Lanes turning, inverse;           ///< of the series' recurrence
 };
 
 /// Holds the equations of four walkers; `torque` is that of a hip that resists turning with a constant size, with its
@@ -33,74 +41,99 @@ struct Equations {
   Lanes p, q, r, w, stance_damping, swing_damping, stance_torque, swing_torque;
 };
 
-/// Fills the series from their first coefficients.
-template <bool with_hip>
-METASTABLE_WIDE void expand(Motion& m, const Equations& e) {
-  const Lanes p = e.p, q = e.q, r = e.r, w = e.w;
+/// Prepares the series from their first coefficients.
+inline __attribute__((always_inline)) void begin(Motion& m, const Equations& e) {
   const Lanes c0 = m.cos_between[0];
-  const Lanes inverse = 1 / (1 - p * r * c0 * c0);
   m.between[0] = m.omega[0] - m.nu[0];
-  for (std::size_t k = 0; k < order; ++k) {
-    Lanes omega2 = {}, nu2 = {};
-    for (std::size_t j = 0; j <= k; ++j) {
-      omega2 += m.omega[j] * m.omega[k - j];
-      nu2 += m.nu[j] * m.nu[k - j];
-    }
-    m.omega_squared[k] = omega2;
-    m.nu_squared[k] = nu2;
-    Lanes by_nu = m.sin_between[0] * nu2, by_omega = m.sin_between[0] * omega2, by_beta = {}, by_alpha = {};
-    for (std::size_t j = 1; j <= k; ++j) {
-      by_nu += m.sin_between[j] * m.nu_squared[k - j];
-      by_omega += m.sin_between[j] * m.omega_squared[k - j];
-      by_beta += m.cos_between[j] * m.beta[k - j];
-      by_alpha += m.cos_between[j] * m.alpha[k - j];
-    }
-    Lanes stance = p * (by_nu + by_beta) + q * m.sin_theta[k];
-    Lanes swing = r * (by_alpha - by_omega) - w * m.sin_psi[k];
-    if constexpr (with_hip) {
-      stance -= e.stance_damping * m.between[k];
-      swing += e.swing_damping * m.between[k];
-      if (k == 0) {
-        stance -= e.stance_torque;
-        swing += e.swing_torque;
-      }
-    }
-    m.alpha[k] = (stance + p * c0 * swing) * inverse;
-    m.beta[k] = swing + r * c0 * m.alpha[k];
+  m.product[0] = m.omega[0] * m.nu[0];
+  m.turning = c0 * m.between[0];
+  m.inverse = 1 / (1 - e.p * e.r * c0 * c0);
+}
 
-    Lanes s1 = {}, c1 = {}, s2 = {}, c2 = {}, s3 = {}, c3 = {};
-    for (std::size_t j = 0; j <= k; ++j) {
-      s1 += m.cos_theta[j] * m.omega[k - j];
-      c1 -= m.sin_theta[j] * m.omega[k - j];
-      s2 += m.cos_psi[j] * m.nu[k - j];
-      c2 -= m.sin_psi[j] * m.nu[k - j];
-      s3 += m.cos_between[j] * m.between[k - j];
-      c3 -= m.sin_between[j] * m.between[k - j];
-    }
-    const double share = 1.0 / static_cast<double>(k + 1);
-    m.sin_theta[k + 1] = share * s1;
-    m.cos_theta[k + 1] = share * c1;
-    m.sin_psi[k + 1] = share * s2;
-    m.cos_psi[k + 1] = share * c2;
-    m.sin_between[k + 1] = share * s3;
-    m.cos_between[k + 1] = share * c3;
-    m.theta[k + 1] = share * m.omega[k];
-    m.psi[k + 1] = share * m.nu[k];
-    m.omega[k + 1] = share * m.alpha[k];
-    m.nu[k + 1] = share * m.beta[k];
-    m.between[k + 1] = m.omega[k + 1] - m.nu[k + 1];
+/// Adds the coefficient k + 1 to the series. Their recurrence is that of the momenta: with x = theta - psi,
+///   (omega - p cos x nu)' = q sin(theta - gamma) - T / A + p sin x omega nu,
+///   (nu - r cos x omega)' = -w sin(psi - gamma) + T / C - r sin x omega nu,
+/// nine products of series, of which those of cos x with both rates serve (sin x)' too.
+template <bool with_hip>
+inline __attribute__((always_inline)) void extend(Motion& m, const Equations& e, std::size_t k) {
+  const Lanes c0 = m.cos_between[0], sb0 = m.sin_between[0], omega0 = m.omega[0], nu0 = m.nu[0];
+  Lanes s1 = m.cos_theta[0] * m.omega[k], c1 = m.sin_theta[0] * m.omega[k], s2 = m.cos_psi[0] * m.nu[k],
+        c2 = m.sin_psi[0] * m.nu[k], c3 = sb0 * m.between[k], force = sb0 * m.product[k], by_nu = {}, by_omega = {},
+        rates = {};
+  for (std::size_t j = 1; j <= k; ++j) {
+    const Lanes omega = m.omega[k - j], nu = m.nu[k - j], sb = m.sin_between[j], cb = m.cos_between[j];
+    s1 += m.cos_theta[j] * omega;
+    c1 += m.sin_theta[j] * omega;
+    s2 += m.cos_psi[j] * nu;
+    c2 += m.sin_psi[j] * nu;
+    c3 += sb * m.between[k - j];
+    force += sb * m.product[k - j];
+    by_nu += cb * m.nu[k + 1 - j];
+    by_omega += cb * m.omega[k + 1 - j];
+    rates += m.omega[j] * m.nu[k + 1 - j];
   }
+  const double share = shares[k + 1];
+  Lanes stance = e.q * m.sin_theta[k] + e.p * force, swing = e.w * m.sin_psi[k] + e.r * force;
+  if constexpr (with_hip) {
+    stance -= e.stance_damping * m.between[k];
+    swing -= e.swing_damping * m.between[k];
+    if (k == 0) {
+      stance -= e.stance_torque;
+      swing -= e.swing_torque;
+    }
+  }
+  m.sin_theta[k + 1] = share * s1;
+  m.cos_theta[k + 1] = -share * c1;
+  m.sin_psi[k + 1] = share * s2;
+  m.cos_psi[k + 1] = -share * c2;
+  m.sin_between[k + 1] = share * m.turning;
+  m.cos_between[k + 1] = -share * c3;
+  m.theta[k + 1] = share * m.omega[k];
+  m.psi[k + 1] = share * m.nu[k];
+  by_nu += m.cos_between[k + 1] * nu0;
+  by_omega += m.cos_between[k + 1] * omega0;
+  const Lanes rest = e.r * by_omega - share * swing;
+  m.omega[k + 1] = (share * stance + e.p * (by_nu + c0 * rest)) * m.inverse;
+  m.nu[k + 1] = rest + e.r * c0 * m.omega[k + 1];
+  m.between[k + 1] = m.omega[k + 1] - m.nu[k + 1];
+  m.product[k + 1] = rates + omega0 * m.nu[k + 1] + m.omega[k + 1] * nu0;
+  m.turning = c0 * m.between[k + 1] + (by_omega - by_nu);
+}
+
+/// Fills the series from their first coefficients: while the results of one vector of walkers are waited for, those of
+/// the other are at work.
+template <bool with_hip>
+METASTABLE_WIDE void expand(std::array<Motion, vectors>& m, const std::array<Equations, vectors>& e) {
+  for (std::size_t v = 0; v < vectors; ++v) begin(m[v], e[v]);
+  for (std::size_t k = 0; k < order; ++k)
+    for (std::size_t v = 0; v < vectors; ++v) extend<with_hip>(m[v], e[v], k);
 }
 
 /// Sets the first coefficients of `end` to the motion `time` later.
 METASTABLE_WIDE void advance(const Motion& m, const Lanes& time, Motion& end) {
-  for (Series Motion::*const series :
-       {&Motion::theta, &Motion::psi, &Motion::omega, &Motion::nu, &Motion::sin_theta, &Motion::cos_theta,
-        &Motion::sin_psi, &Motion::cos_psi, &Motion::sin_between, &Motion::cos_between}) {
-    Lanes value = (m.*series)[order];
-    for (std::size_t k = order; k-- > 0;) value = value * time + (m.*series)[k];
-    (end.*series)[0] = value;
+  Lanes theta = m.theta[order], psi = m.psi[order], omega = m.omega[order], nu = m.nu[order],
+        sin_theta = m.sin_theta[order], cos_theta = m.cos_theta[order], sin_psi = m.sin_psi[order],
+        cos_psi = m.cos_psi[order];
+  for (std::size_t k = order; k-- > 0;) {
+    theta = theta * time + m.theta[k];
+    psi = psi * time + m.psi[k];
+    omega = omega * time + m.omega[k];
+    nu = nu * time + m.nu[k];
+    sin_theta = sin_theta * time + m.sin_theta[k];
+    cos_theta = cos_theta * time + m.cos_theta[k];
+    sin_psi = sin_psi * time + m.sin_psi[k];
+    cos_psi = cos_psi * time + m.cos_psi[k];
   }
+  end.theta[0] = theta;
+  end.psi[0] = psi;
+  end.omega[0] = omega;
+  end.nu[0] = nu;
+  end.sin_theta[0] = sin_theta;
+  end.cos_theta[0] = cos_theta;
+  end.sin_psi[0] = sin_psi;
+  end.cos_psi[0] = cos_psi;
+  end.sin_between[0] = sin_theta * cos_psi - cos_theta * sin_psi;
+  end.cos_between[0] = cos_theta * cos_psi + sin_theta * sin_psi;
 }
 
 void start(Motion& m, std::size_t lane, const LegMotion& from, double slope) {
@@ -123,19 +156,38 @@ double at(const Series& series, std::size_t lane, double time) {
   return value;
 }
 
-/// Finds where `value` goes from positive at `low` to not positive at `high`: Newton's steps with `rate`, halved
-/// intervals where those leave the bracket.
-template <class Value, class Rate>
-double falling_root(double low, double high, const Value& value, const Rate& rate) {
-  double time = high;
+/// Holds one walker's Taylor coefficients of a quantity within a step.
+class Course {
+ public:
+  /// Sums or subtracts two quantities.
+  Course(const Series& a, const Series& b, double factor, std::size_t lane) {
+    for (std::size_t k = 0; k <= order; ++k) coefficient_[k] = a[k][lane] + factor * b[k][lane];
+  }
+  /// Returns the value and its derivative.
+  std::pair<double, double> with_rate(double time) const {
+    double value = coefficient_[order], rate = 0;
+    for (std::size_t k = order; k-- > 0;) {
+      rate = rate * time + value;
+      value = value * time + coefficient_[k];
+    }
+    return {value, rate};
+  }
+
+ private:
+  std::array<double, order + 1> coefficient_;
+};
+
+/// Finds where `sign` times a quantity goes from positive at `low` to not positive at `high`: Newton's steps from where
+/// the chord does, halved intervals where those leave the bracket.
+double falling_root(double low, double high, double at_low, double at_high, const Course& course, double sign = 1) {
+  double time = sign * at_low > 0 && sign * at_high < 0 ? low + (high - low) * at_low / (at_low - at_high) : high;
   for (int iteration = 0; iteration < 60; ++iteration) {
-    const double now = value(time);
-    (now > 0 ? low : high) = time;
-    double next = time - now / rate(time);
-    if (!(next > low && next < high)) next = 0.5 * (low + high);
-    const double moved = std::abs(next - time);
-    time = next;
-    if (moved <= 1e-8 * (high + moved)) break;  // the step just taken left an error of the square of that
+    const auto [now, rate] = course.with_rate(time);
+    (sign * now > 0 ? low : high) = time;
+    const double step = now / rate;
+    // A step as small as this one leaves an error of its square; it may leave the bracket by as little.
+    if (std::abs(step) <= 1e-8 * time) return time - step;
+    time = time - step > low && time - step < high ? time - step : 0.5 * (low + high);
   }
   return time;
 }
@@ -144,22 +196,19 @@ double falling_root(double low, double high, const Value& value, const Rate& rat
 /// sum falls to zero. Returns the time of the strike within the step of the series, or nothing. `end` is the motion at
 /// the end of the step.
 std::optional<double> strike_time(const Motion& m, std::size_t lane, double step, const Motion& end) {
-  if (end.theta[0][lane] + end.psi[0][lane] > 0 || !(end.theta[0][lane] < 0)) return std::nullopt;
-  const auto gap = [&](double t) { return at(m.theta, lane, t) + at(m.psi, lane, t); };
-  const auto rate = [&](double t) { return at(m.omega, lane, t) + at(m.nu, lane, t); };
-  double low = 0;
-  if (!(m.theta[0][lane] + m.psi[0][lane] > 0)) {
-    // The foot may have risen and come down within the step.
-    if (!(m.omega[0][lane] + m.nu[0][lane] > 0 && end.omega[0][lane] + end.nu[0][lane] < 0)) return std::nullopt;
-    low = falling_root(0, step, rate, [&](double t) {
-      double slope = 0;
-      for (std::size_t k = order; k >= 1; --k)
-        slope = slope * t + static_cast<double>(k) * (m.omega[k][lane] + m.nu[k][lane]);
-      return slope;
-    });
-    if (!(gap(low) > 0)) return std::nullopt;
+  const double begins = m.theta[0][lane] + m.psi[0][lane], ends = end.theta[0][lane] + end.psi[0][lane];
+  if (ends > 0 || !(end.theta[0][lane] < 0)) return std::nullopt;
+  // The foot may have risen and come down within the step.
+  const double rises = m.omega[0][lane] + m.nu[0][lane], falls = end.omega[0][lane] + end.nu[0][lane];
+  if (!(begins > 0) && !(rises > 0 && falls < 0)) return std::nullopt;
+  const Course gap(m.theta, m.psi, 1, lane);
+  double low = 0, highest = begins;
+  if (!(begins > 0)) {
+    low = falling_root(0, step, rises, falls, Course(m.omega, m.nu, 1, lane));
+    highest = gap.with_rate(low).first;
+    if (!(highest > 0)) return std::nullopt;
   }
-  const double time = falling_root(low, step, gap, rate);
+  const double time = falling_root(low, step, highest, ends, gap);
   if (!(at(m.theta, lane, time) < 0)) return std::nullopt;
   return time;
 }
@@ -168,103 +217,116 @@ std::optional<double> strike_time(const Motion& m, std::size_t lane, double step
 std::optional<double> turning_back(const Motion& m, std::size_t lane, double step, const Motion& end) {
   const double before = m.omega[0][lane] - m.nu[0][lane], after = end.omega[0][lane] - end.nu[0][lane];
   if (!(before * after < 0)) return std::nullopt;
-  const double sign = before > 0 ? 1 : -1;
-  const auto turning = [&](double t) { return sign * (at(m.omega, lane, t) - at(m.nu, lane, t)); };
-  const auto faster = [&](double t) {
-    double slope = 0;
-    for (std::size_t k = order; k >= 1; --k)
-      slope = slope * t + static_cast<double>(k) * (m.omega[k][lane] - m.nu[k][lane]);
-    return sign * slope;
-  };
-  return falling_root(0, step, turning, faster);
+  return falling_root(0, step, before, after, Course(m.omega, m.nu, -1, lane), before > 0 ? 1 : -1);
 }
 
-/// Holds four walkers on their way: a lane without a walker repeats the last one.
+/// Holds eight walkers on their way; one that arrives makes room for the next. A lane without a walker goes on with the
+/// last one that it had, or with the first of all.
 class Way {
  public:
-  Way(std::span<const LegMotion> from, std::span<const double> slopes, std::span<const LegEquations> equations,
-      std::span<const LegCourse> courses) {
-    for (std::size_t k = 0; k < width; ++k) {
-      const std::size_t i = std::min(k, from.size() - 1);
-      const LegEquations& e = equations[i];
-      equations_.p[k] = e.p;
-      equations_.q[k] = e.q;
-      equations_.r[k] = e.r;
-      equations_.w[k] = e.w;
-      equations_.stance_damping[k] = e.stance_damping;
-      equations_.swing_damping[k] = e.swing_damping;
-      friction_[k] = {e.stance_friction, e.swing_friction};
-      hip_ = hip_ || e.stance_damping != 0 || e.swing_damping != 0 || e.stance_friction != 0;
-      taylor_step_[k] = courses[i].taylor_step;
-      start(now(), k, from[i], slopes[i]);
-    }
+  Way(const LegMotion& from, double slope, const LegEquations& equations, const LegCourse& course) {
+    for (std::size_t k = 0; k < width; ++k) set_out(k, from, slope, equations, course);
+  }
+
+  void set_out(std::size_t k, const LegMotion& from, double slope, const LegEquations& e, const LegCourse& course) {
+    equations_[k / vector_width].p[k % vector_width] = e.p;
+    equations_[k / vector_width].q[k % vector_width] = e.q;
+    equations_[k / vector_width].r[k % vector_width] = e.r;
+    equations_[k / vector_width].w[k % vector_width] = e.w;
+    equations_[k / vector_width].stance_damping[k % vector_width] = e.stance_damping;
+    equations_[k / vector_width].swing_damping[k % vector_width] = e.swing_damping;
+    friction_[k] = {e.stance_friction, e.swing_friction};
+    hip_ = hip_ || e.stance_damping != 0 || e.swing_damping != 0 || e.stance_friction != 0;
+    taylor_step_[k / vector_width][k % vector_width] = course.taylor_step;
+    passed_[k] = 0;
+    turns_back_[k] = false;
+    start(now(k), k % vector_width, from, slope);
   }
 
   /// Expands the motion, with the hip's friction against the turning, and moves on by a Taylor step, or up to where a
   /// hip with friction turns back.
   void go_on() {
-    std::array<double, width> sign{};
-    for (std::size_t k = 0; k < width; ++k) {
-      const double turning = now().omega[0][k] - now().nu[0][k];
-      sign[k] = turns_back_[k] ? -sign_[k] : turning > 0 ? 1 : turning < 0 ? -1 : 0;
-      set_torque(k, sign[k]);
-    }
-    expand_now();
-    bool held = false;  // a friction that would turn the legs back at once lets them pass this moment
-    for (std::size_t k = 0; k < width; ++k)
-      if (turns_back_[k] && sign[k] * (now().alpha[0][k] - now().beta[0][k]) < 0) {
-        set_torque(k, 0);
-        held = true;
-      }
-    if (held) expand_now();
+    if (hip_) return go_on_against_friction();
+    expand<false>(motions_[at_], equations_);
     steps_ = taylor_step_;
-    advance(now(), steps_, next());
-    bool cut = false;
-    for (std::size_t k = 0; k < width; ++k) {
-      const auto time = friction_[k].first != 0 && !turns_back_[k] ? turning_back(now(), k, taylor_step_[k], next())
-                                                                   : std::optional<double>();
-      turns_back_[k] = time.has_value();
-      sign_[k] = sign[k];
-      if (time) steps_[k] = *time;
-      cut = cut || time;
-    }
-    if (cut) advance(now(), steps_, next());
+    move_on();
   }
   void arrive() {
-    passed_ += steps_;
+    for (std::size_t k = 0; k < width; ++k) passed_[k] += step_of(k);
     at_ = 1 - at_;
   }
   std::optional<LegMotion> struck(std::size_t lane) const {
-    const auto time = strike_time(now(), lane, steps_[lane], next());
+    const auto time = strike_time(now(lane), lane % vector_width, step_of(lane), next(lane));
     if (!time) return std::nullopt;
     return after(lane, *time);
   }
   LegMotion after(std::size_t k, double time) const {
-    return {passed_[k] + time, at(now().theta, k, time), at(now().psi, k, time), at(now().omega, k, time),
-            at(now().nu, k, time)};
+    const Motion& m = now(k);
+    const std::size_t lane = k % vector_width;
+    return {passed_[k] + time, at(m.theta, lane, time), at(m.psi, lane, time), at(m.omega, lane, time),
+            at(m.nu, lane, time)};
   }
-  bool lies_down(std::size_t lane) const { return !(std::abs(next().theta[0][lane]) < std::numbers::pi / 2); }
-  double arrival(std::size_t lane) const { return passed_[lane] + steps_[lane]; }
+  bool lies_down(std::size_t lane) const {
+    return !(std::abs(next(lane).theta[0][lane % vector_width]) < std::numbers::pi / 2);
+  }
+  double arrival(std::size_t lane) const { return passed_[lane] + step_of(lane); }
   double passed(std::size_t lane) const { return passed_[lane]; }
 
  private:
-  Motion& now() { return motions_[at_]; }
-  Motion& next() { return motions_[1 - at_]; }
-  const Motion& now() const { return motions_[at_]; }
-  const Motion& next() const { return motions_[1 - at_]; }
-  void expand_now() { hip_ ? expand<true>(now(), equations_) : expand<false>(now(), equations_); }
+  Motion& now(std::size_t lane) { return motions_[at_][lane / vector_width]; }
+  const Motion& now(std::size_t lane) const { return motions_[at_][lane / vector_width]; }
+  const Motion& next(std::size_t lane) const { return motions_[1 - at_][lane / vector_width]; }
+  double step_of(std::size_t lane) const { return steps_[lane / vector_width][lane % vector_width]; }
+  void move_on() {
+    for (std::size_t v = 0; v < vectors; ++v) advance(motions_[at_][v], steps_[v], motions_[1 - at_][v]);
+  }
+  /// Returns a coefficient of omega - nu.
+  double rate_between(std::size_t lane, std::size_t k) const {
+    return now(lane).omega[k][lane % vector_width] - now(lane).nu[k][lane % vector_width];
+  }
   void set_torque(std::size_t lane, double sign) {
-    equations_.stance_torque[lane] = sign * friction_[lane].first;
-    equations_.swing_torque[lane] = sign * friction_[lane].second;
+    equations_[lane / vector_width].stance_torque[lane % vector_width] = sign * friction_[lane].first;
+    equations_[lane / vector_width].swing_torque[lane % vector_width] = sign * friction_[lane].second;
   }
 
-  std::array<Motion, 2> motions_;  // start() and advance() set what expand() takes
-  std::size_t at_ = 0;             // which of them is now
-  Equations equations_{};
+  void go_on_against_friction() {
+    std::array<double, width> sign{};
+    for (std::size_t k = 0; k < width; ++k) {
+      const double turning = rate_between(k, 0);
+      sign[k] = turns_back_[k] ? -sign_[k] : turning > 0 ? 1 : turning < 0 ? -1 : 0;
+      set_torque(k, sign[k]);
+    }
+    expand<true>(motions_[at_], equations_);
+    bool held = false;  // a friction that would turn the legs back at once lets them pass this moment
+    for (std::size_t k = 0; k < width; ++k)
+      if (turns_back_[k] && sign[k] * (rate_between(k, 1)) < 0) {
+        set_torque(k, 0);
+        held = true;
+      }
+    if (held) expand<true>(motions_[at_], equations_);
+    steps_ = taylor_step_;
+    move_on();
+    bool cut = false;
+    for (std::size_t k = 0; k < width; ++k) {
+      const auto time = friction_[k].first != 0 && !turns_back_[k]
+                            ? turning_back(now(k), k % vector_width, step_of(k), next(k))
+                            : std::optional<double>();
+      turns_back_[k] = time.has_value();
+      sign_[k] = sign[k];
+      if (time) steps_[k / vector_width][k % vector_width] = *time;
+      cut = cut || time;
+    }
+    if (cut) move_on();
+  }
+
+  std::array<std::array<Motion, vectors>, 2> motions_;  // start() and advance() set what expand() takes
+  std::size_t at_ = 0;                                  // which of them are now
+  std::array<Equations, vectors> equations_{};
   std::array<std::pair<double, double>, width> friction_{};
   std::array<double, width> sign_{};
   std::array<bool, width> turns_back_{};  // at the moment that the series start from
-  Lanes steps_{}, passed_{}, taylor_step_{};
+  std::array<Lanes, vectors> steps_{}, taylor_step_{};
+  std::array<double, width> passed_{};
   bool hip_ = false;
 };
 
@@ -272,25 +334,39 @@ class Way {
 
 StruckLegs follow_legs(std::span<const LegMotion> from, std::span<const double> slopes,
                        std::span<const LegEquations> equations, std::span<const LegCourse> courses) {
+  constexpr std::size_t nobody = legs_at_once;
   StruckLegs struck;
-  Way way(from, slopes, equations, courses);
-  std::array<bool, width> done{};
-  for (std::size_t left = from.size(); left > 0; way.arrive()) {
+  if (from.empty()) return struck;
+  Way way(from[0], slopes[0], equations[0], courses[0]);
+  std::array<std::size_t, width> walker{};  // of each lane
+  std::size_t next = 0;
+  const auto set_out = [&](std::size_t lane) {
+    walker[lane] = next < from.size() ? next++ : nobody;
+    const std::size_t i = walker[lane];
+    if (i != nobody) way.set_out(lane, from[i], slopes[i], equations[i], courses[i]);
+  };
+  for (std::size_t lane = 0; lane < width; ++lane) set_out(lane);
+  for (std::size_t left = from.size(); left > 0;) {
     way.go_on();
-    for (std::size_t k = 0; k < from.size(); ++k) {
-      if (done[k]) continue;
-      struck[k] = way.struck(k);
-      if (!struck[k] && !way.lies_down(k) && way.arrival(k) <= courses[k].longest) continue;
-      done[k] = true;
+    std::array<bool, width> done{};
+    for (std::size_t lane = 0; lane < width; ++lane) {
+      const std::size_t i = walker[lane];
+      if (i == nobody) continue;
+      struck[i] = way.struck(lane);
+      done[lane] = struck[i] || way.lies_down(lane) || !(way.arrival(lane) <= courses[i].longest);
+    }
+    way.arrive();
+    for (std::size_t lane = 0; lane < width; ++lane) {
+      if (!done[lane]) continue;
       --left;
+      set_out(lane);
     }
   }
   return struck;
 }
 
 LegMotion legs_at(const LegMotion& from, double slope, const LegEquations& equations, double taylor_step, double time) {
-  const LegCourse course{taylor_step, time};
-  Way way({&from, 1}, {&slope, 1}, {&equations, 1}, {&course, 1});
+  Way way(from, slope, equations, {taylor_step, time});
   for (way.go_on(); way.arrival(0) < time; way.go_on()) way.arrive();
   return way.after(0, time - way.passed(0));
 }

@@ -1,5 +1,5 @@
 #pragma once
-// Follows two stiff legs joined at a hip from one strike to the next, by Taylor series, four walkers at once.
+// Follows two stiff legs joined at a hip from one strike to the next, by Taylor series, many walkers at once.
 
 #include <array>
 #include <cstddef>
@@ -34,10 +34,10 @@ struct LegCourse {
   double longest = 0;  ///< a walker whose foot has not struck by then has fallen
 };
 
-inline constexpr std::size_t legs_at_once = 4;
+inline constexpr std::size_t legs_at_once = 64;
 using StruckLegs = std::array<std::optional<LegMotion>, legs_at_once>;
 
-/// Follows up to four walkers to just before their feet strike. The swing foot strikes when it comes down before the
+/// Follows up to legs_at_once walkers to just before their feet strike. The swing foot strikes when it comes down before the
 /// stance foot. Nothing of a walker whose stance leg lies down, or that takes longer than `course.longest`. A walker's
 /// bits do not depend on the others.
 /// @param from, slopes [rad], equations, courses  of each walker

@@ -41,7 +41,7 @@ LegMotion start(const Stride& stride, const Ground& ground) {
 TwoLinkWalker::TwoLinkWalker(const CompassOptions& masses, const LegEquations& equations, int dimension)
     : masses_(masses), equations_(equations), dimension_(dimension) {
   const double length = masses.foot_to_mass + masses.mass_to_hip;
-  course_ = {(dimension == 2 ? 0.5 : 0.4) * std::sqrt(std::min(length, masses.mass_to_hip) / masses.gravity),
+  course_ = {(dimension == 2 ? 0.3 : 0.25) * std::sqrt(std::min(length, masses.mass_to_hip) / masses.gravity),
              30 * std::sqrt(length / masses.gravity)};
 }
 

@@ -55,7 +55,7 @@ class TwoLinkWalker {
 
   /// Takes one step of each of n walkers: state i stands at states[i * dimension()], meets grounds[i] and leads to
   /// next[i * dimension()], or fell[i] is 1 (and next is left alone): the stance leg lies down, or no strike comes
-  /// within 30 sqrt(l/g). About 2 us a step. The bits of a walker's step do not depend on the others.
+  /// within 30 sqrt(l/g). About 1.2 us a step. The bits of a walker's step do not depend on the others.
   /// @throws std::invalid_argument for sizes that do not match; for a state that is not finite, or lies outside
   ///         0 < half angle < pi/2: it is named
   void step(std::span<const double> states, std::span<const Ground> grounds, std::span<double> next,

@@ -45,6 +45,23 @@ TEST(TwoLinkWalker, KeepsItsEnergyBetweenStrikes) {
   }
 }
 
+TEST(TwoLinkWalker, StrikesWhereTheFeetAreLevel) {
+  const TwoLinkWalker walker = TwoLinkWalker::compass();
+  int strikes = 0;
+  for (int i = 0; i < 4000; ++i) {  // a lattice of rank one around the gait
+    const auto spread = [&](double irrational) { return 0.4 * (i * irrational - std::floor(i * irrational) - 0.5); };
+    const Stride stride{compass_gait.half_angle_rad * (1 + spread(0.7548776662466927)),
+                        compass_gait.stance_rate * (1 + spread(0.5698402909980532)),
+                        compass_gait.swing_rate * (1 + spread(0.4301597090019468))};
+    const double slope = compass_slope * (1 + spread(0.3247179572447460));
+    const auto end = walker.before_strike(stride, {slope, slope});
+    if (!end) continue;
+    ++strikes;
+    ASSERT_NEAR(end->stance_angle + end->swing_angle, 0, 1e-14) << i;
+  }
+  EXPECT_GT(strikes, 2000);
+}
+
 TEST(TwoLinkWalker, EnergyIsThatOfItsPoints) {
   const CompassOptions o{.leg_mass = 3, .hip_mass = 7, .foot_to_mass = 0.3, .mass_to_hip = 0.6, .gravity = 9.81};
   const LegMotion s{0, 0.2, -0.35, -1.2, 0.7};
