@@ -164,16 +164,37 @@ void MeshGrowth::follow(std::vector<std::uint32_t> rows) {
   cheapest_failure_ = -largest(-cheapest_failure_);
 }
 
-void MeshGrowth::store(std::uint32_t node, Parts& parts, double failed, double away) {
-  std::sort(parts.begin(), parts.end(), [](const auto& a, const auto& b) { return a.first < b.first; });
-  std::size_t used = 0;
-  for (std::size_t i = 0; i < parts.size(); ++i) {
-    if (used > 0 && parts[used - 1].first == parts[i].first)
-      parts[used - 1].second += parts[i].second;
-    else
-      parts[used++] = parts[i];
+/// Adds up the parts of each key, in the order in which keys come first.
+void MeshGrowth::add_up(Parts& parts) {
+  while (place_of_.size() < 2 * parts.size()) {
+    place_of_.assign(std::max<std::size_t>(1024, 2 * place_of_.size()), {0, 0});
+    added_up_ = 0;
+  }
+  if (++added_up_ == 0) {  // it has come round
+    std::fill(place_of_.begin(), place_of_.end(), std::pair<std::uint32_t, std::uint32_t>{0, 0});
+    added_up_ = 1;
+  }
+  const std::size_t mask = place_of_.size() - 1;
+  std::uint32_t used = 0;
+  for (std::size_t next = 0; next < parts.size(); ++next) {
+    const Parts::value_type part = parts[next];
+    std::size_t i = NodeTable::first_slot(part.first, place_of_.size());
+    while (place_of_[i & mask].first == added_up_ && parts[place_of_[i & mask].second].first != part.first) ++i;
+    auto& [stamp, place] = place_of_[i & mask];
+    if (stamp == added_up_) {
+      parts[place].second += part.second;
+    } else {
+      stamp = added_up_;
+      place = used;
+      parts[used++] = part;
+    }
   }
   parts.resize(used);
+}
+
+void MeshGrowth::store(std::uint32_t node, Parts& parts, double failed, double away) {
+  add_up(parts);
+  const std::size_t used = parts.size();
   if (chunk_.empty() || chunk_.back().column.size() + used > chunk_.back().column.capacity()) {
     const std::size_t size = std::max(used, std::clamp(entries_, fewest_in_chunk, most_in_chunk));
     chunk_.emplace_back();
@@ -183,7 +204,10 @@ void MeshGrowth::store(std::uint32_t node, Parts& parts, double failed, double a
   Chunk& chunk = chunk_.back();
   Row row{.node = node, .chunk = static_cast<std::uint32_t>(chunk_.size() - 1), .largest = failed, .kill = failed};
   row.leave = away;
-  for (const auto& part : parts) row.largest = std::max(row.largest, part.second);
+  for (const auto& part : parts) {
+    row.largest = std::max(row.largest, part.second);
+    table_.fetch(part.first);
+  }
   const double least = row.largest * std::exp(action_[node] - limit());
   row.first = static_cast<std::uint32_t>(chunk.column.size());
   for (const auto& [key, value] : parts) {

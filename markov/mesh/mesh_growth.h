@@ -104,6 +104,7 @@ class MeshGrowth {
   std::vector<double> row_states(std::uint32_t node, std::size_t count) const;
   double add_lines(std::uint32_t node, Lines& lines) const;
   void land(std::span<const std::uint32_t> nodes);
+  void add_up(Parts& parts);
   void store(std::uint32_t node, Parts& parts, double failed, double away);
   void follow(std::vector<std::uint32_t> rows);
   void relax(const Row& row);
@@ -126,6 +127,8 @@ class MeshGrowth {
   std::vector<std::uint8_t> own_;
   std::vector<Row> row_;
   std::vector<Chunk> chunk_;
+  std::vector<std::pair<std::uint32_t, std::uint32_t>> place_of_;  ///< of add_up(): its number, and a place by key
+  std::uint32_t added_up_ = 0;
   std::size_t entries_ = 0, forgotten_ = 0;
   std::vector<std::vector<std::uint32_t>> bucket_;
   std::size_t current_ = 0;

@@ -24,7 +24,7 @@ std::uint64_t pack(int phase, const Place& place) {
 std::uint32_t NodeTable::find(std::uint64_t key) const {
   if (slot_.empty()) return none;
   const std::size_t mask = slot_.size() - 1;
-  for (std::size_t i = (key * 0x9e3779b97f4a7c15ULL) >> 20;; ++i) {
+  for (std::size_t i = first_slot(key, slot_.size());; ++i) {
     const auto& slot = slot_[i & mask];
     if (slot.second == none) return none;
     if (slot.first == key) return slot.second;
@@ -40,7 +40,7 @@ void NodeTable::insert(std::uint64_t key, std::uint32_t node) {
       if (n != none) insert(k, n);
   }
   const std::size_t mask = slot_.size() - 1;
-  std::size_t i = (key * 0x9e3779b97f4a7c15ULL) >> 20;
+  std::size_t i = first_slot(key, slot_.size());
   while (slot_[i & mask].second != none) ++i;
   slot_[i & mask] = {key, node};
   ++used_;
@@ -88,9 +88,10 @@ std::uint64_t NodeLattice::axis_key(std::size_t k) { return std::uint64_t{1} << 
 std::uint64_t NodeLattice::find_cell(int phase, const Point& point, Point& fraction) const {
   Place at{};
   for (std::size_t k = 0; k < dimension(); ++k) {
-    const double below = std::floor(point[k]);
-    fraction[k] = point[k] - below;
-    at[k] = static_cast<std::int32_t>(below);
+    // The floor of a number that nodes reach: a processor of the baseline has no instruction for it.
+    at[k] = static_cast<std::int32_t>(point[k]);
+    at[k] -= point[k] < at[k];
+    fraction[k] = point[k] - at[k];
   }
   return pack(phase, at);
 }

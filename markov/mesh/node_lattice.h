@@ -2,6 +2,7 @@
 // Keeps the nodes of a mesh: a lattice in the principal axes of the noise, phase by phase, each node with its own key.
 
 #include <array>
+#include <bit>
 #include <cstdint>
 #include <span>
 #include <utility>
@@ -54,6 +55,15 @@ class NodeTable {
  public:
   static constexpr std::uint32_t none = 0xffffffffU;
   std::uint32_t find(std::uint64_t key) const;
+  /// Has the memory fetched where a key will be looked for.
+  void fetch(std::uint64_t key) const {
+    if (!slot_.empty()) __builtin_prefetch(&slot_[first_slot(key, slot_.size())]);
+  }
+  /// Returns where to look first for a key in a table of a power of two slots, 2 to 2^32: the highest bits of a
+  /// product, on which all bits of the key bear. Lower ones know the last axes alone.
+  static std::size_t first_slot(std::uint64_t key, std::size_t slots) {
+    return static_cast<std::size_t>((key * 0x9e3779b97f4a7c15ULL) >> (64 - std::countr_zero(slots)));
+  }
   void insert(std::uint64_t key, std::uint32_t node);
   std::size_t bytes() const { return slot_.capacity() * sizeof(slot_[0]); }
 

@@ -11,9 +11,10 @@ namespace metastable::markov {
 namespace {
 
 constexpr double narrowest_gap = 1.0 / 512;  // of the spacing: gaps are halved so far, to find where failures begin
-constexpr double foretold = 1e-3;            // stationary sds: what a gap's middle may lie off before it was stepped;
-                                             // afterwards a sixteenth is left
-constexpr double extrapolated = 40;          // times that, where a cubic had to look beyond its places
+constexpr std::size_t most_places = 6;       // that a polynomial goes through
+constexpr double foretold = 2e-3;            // stationary sds: what a gap's middle may lie off before it was stepped;
+                                             // afterwards a sixty-fourth is left
+constexpr double extrapolated = 10;          // times that, where a polynomial had to look beyond its places
 constexpr int foreseen = 2;                  // further halvings of a gap that a dear map is asked for ahead
 constexpr double per_cell = 2,
                  pair_limit = 1024;  // pairs of Gauss's points a cell of the lattice, and between two places
@@ -26,11 +27,11 @@ double normal_mass(double low, double high) {
   return low > 0 ? tail(low) - tail(high) : tail(-high) - tail(-low);
 }
 
-/// The polynomial through up to four places, in Newton's form.
-class Cubic {
+/// The polynomial through up to most_places places, in Newton's form.
+class PlacePolynomial {
  public:
   template <class Places>
-  explicit Cubic(const Places& places) : count_(places.size()) {
+  explicit PlacePolynomial(const Places& places) : count_(places.size()) {
     for (std::size_t i = 0; i < count_; ++i) {
       score_[i] = places[i].score;
       by_[i] = places[i].landing.at;
@@ -49,8 +50,8 @@ class Cubic {
 
  private:
   std::size_t count_;
-  std::array<double, 4> score_{};
-  std::array<Point, 4> by_{};
+  std::array<double, most_places> score_{};
+  std::array<Point, most_places> by_{};
 };
 
 double distance(const Point& a, const Point& b) {
@@ -75,16 +76,30 @@ class Sharing {
       flush();
       cell_ = cell;
     }
-    std::array<double, 16> share{weight * weight_};
-    for (std::size_t k = 0, corners = 1; k < dimension_; ++k, corners *= 2)
+    switch (dimension_) {
+      case 1:
+        return share_out<1>(fraction, weight * weight_);
+      case 2:
+        return share_out<2>(fraction, weight * weight_);
+      case 3:
+        return share_out<3>(fraction, weight * weight_);
+      default:
+        return share_out<4>(fraction, weight * weight_);
+    }
+  }
+
+ private:
+  template <std::size_t dimension>
+  void share_out(const Point& fraction, double weight) {
+    std::array<double, std::size_t{1} << dimension> share{weight};
+    for (std::size_t k = 0, corners = 1; k < dimension; ++k, corners *= 2)
       for (std::size_t c = 0; c < corners; ++c) {
         share[c + corners] = share[c] * fraction[k];
         share[c] -= share[c + corners];
       }
-    for (std::size_t c = 0; c < std::size_t{1} << dimension_; ++c) sum_[c] += share[c];
+    for (std::size_t c = 0; c < share.size(); ++c) sum_[c] += share[c];
   }
 
- private:
   void flush() {
     for (std::size_t c = 0; c < std::size_t{1} << dimension_; ++c) {
       if (!(sum_[c] > 0)) continue;
@@ -106,21 +121,21 @@ class Sharing {
 };
 
 /// Shares the mass between two scores along a curve that goes through about so many cells.
-void share_along(const Cubic& curve, double low, double high, double cells, Sharing& sharing) {
+void share_along(const PlacePolynomial& curve, double low, double high, double cells, Sharing& sharing) {
   const double mass = normal_mass(low, high);
   if (!(mass > 0)) return;
   const double pairs = std::clamp(std::ceil(cells * per_cell), 1.0, pair_limit), width = (high - low) / pairs;
   const double aside = 0.5 / std::numbers::sqrt3;  // Gauss's two points of (-1/2, 1/2)
+  std::array<double, 2 * static_cast<std::size_t>(pair_limit)> density;
+  double sum = 0;
+  std::size_t count = 0;
   const auto each = [&](const auto& use) {
     for (double i = 0.5; i < pairs; i += 1)
-      for (const double part : {i - aside, i + aside}) {
-        const double z = low + width * part;
-        use(z, std::exp(0.5 * (low * low - z * z)));
-      }
+      for (const double part : {i - aside, i + aside}) use(low + width * part);
   };
-  double sum = 0;
-  each([&](double, double density) { sum += density; });
-  each([&](double z, double density) { sharing.add(curve(z), mass * density / sum); });
+  each([&](double z) { sum += density[count++] = std::exp(0.5 * (low * low - z * z)); });
+  count = 0;
+  each([&](double z) { sharing.add(curve(z), mass * density[count++] / sum); });
 }
 
 }  // namespace
@@ -135,10 +150,10 @@ bool ScoreCurve::joined(std::size_t left) const {
   return place_[left].landing.fate == Fate::lands && place_[left + 1].landing.fate == Fate::lands && !place_[left].torn;
 }
 
-/// Returns the nearest places, four at most, on the piece of the curve that holds the places left .. right.
+/// Returns the nearest places, most_places at most, on the piece of the curve that holds the places left .. right.
 std::span<const ScoreCurve::Place> ScoreCurve::stencil(std::size_t left, std::size_t right) const {
   std::size_t first = left, last = right;
-  while (last - first < 3) {
+  while (last - first + 1 < most_places) {
     const bool before = first > 0 && joined(first - 1), after = last + 1 < place_.size() && joined(last);
     if (!before && !after) break;
     if (!after || (before && left - first <= last - right))
@@ -154,7 +169,7 @@ void ScoreCurve::halve(Place& left, Place& middle, const Place& right, std::size
   const bool more = middle.score - left.score > narrowest_;
   const auto lands = [](const Place& place) { return place.landing.fate == Fate::lands; };
   const auto off = [&](std::size_t from, std::size_t to) {
-    return unit * distance(Cubic(stencil(from, to))(middle.score), middle.landing.at);
+    return unit * distance(PlacePolynomial(stencil(from, to))(middle.score), middle.landing.at);
   };
   const bool l = lands(left), m = lands(middle), r = lands(right);
   left.open = more && left.landing.fate != middle.landing.fate;
@@ -219,8 +234,8 @@ ScoreCurve::Shares ScoreCurve::share(const NodeLattice& lattice, int phase, doub
   for (std::size_t i = 0; i + 1 < place_.size(); ++i) {
     const Place &left = place_[i], &right = place_[i + 1];
     if (joined(i)) {
-      share_along(Cubic(stencil(i, i + 1)), left.score, right.score, distance(left.landing.at, right.landing.at),
-                  sharing);
+      share_along(PlacePolynomial(stencil(i, i + 1)), left.score, right.score,
+                  distance(left.landing.at, right.landing.at), sharing);
     } else {
       const double between = 0.5 * (left.score + right.score);
       give(left.landing, normal_mass(left.score, between));

@@ -117,5 +117,27 @@ TEST(MeshGrowth, RanksGrowTheRowsOfOneProcess) {
   expect_rows_of_one_process(skew_batch(0.8), {2, -2.0 / 3}, {.spacing = 1.2});
 }
 
+TEST(NodeTable, SpreadsTheNodesOfALatticeOfAnyDimension) {
+  // 4096 keys in 8192 slots: of 64 x 64 nodes in a plane of each two axes, and of 16^3 in space.
+  const auto shared = [](const std::vector<std::uint64_t>& keys) {
+    std::vector<int> slot(2 * keys.size());
+    for (const std::uint64_t key : keys) ++slot[NodeTable::first_slot(key, slot.size())];
+    return *std::max_element(slot.begin(), slot.end());
+  };
+  for (const auto& [a, b] : {std::pair(0, 1), std::pair(0, 2), std::pair(2, 3)}) {
+    std::vector<std::uint64_t> keys;
+    for (std::uint64_t i = 0; i < 64; ++i)
+      for (std::uint64_t j = 0; j < 64; ++j)
+        keys.push_back(i * NodeLattice::axis_key(static_cast<std::size_t>(a)) +
+                       j * NodeLattice::axis_key(static_cast<std::size_t>(b)));
+    EXPECT_LE(shared(keys), 16) << a << b;
+  }
+  std::vector<std::uint64_t> keys;
+  for (std::uint64_t i = 0; i < 4096; ++i)
+    keys.push_back(i % 16 * NodeLattice::axis_key(0) + i / 16 % 16 * NodeLattice::axis_key(1) +
+                   i / 256 * NodeLattice::axis_key(2));
+  EXPECT_LE(shared(keys), 16);
+}
+
 }  // namespace
 }  // namespace metastable::markov
