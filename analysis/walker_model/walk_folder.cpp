@@ -19,6 +19,7 @@
 #include "analysis/walkers/walker_study.h"
 #include "dynamics/numerics/truncated_normal.h"
 #include "dynamics/walkers/gait.h"
+#include "markov/parallel.h"
 
 namespace metastable::analysis {
 namespace {
@@ -149,24 +150,24 @@ class WalkDrawer {
       : machine_(machine), values_(std::move(values)), options_(options), rate_error_(rate_error) {}
 
   // Returns whether it fell.
-  bool draw(std::size_t trial, std::vector<double> state, std::string& rows) {
-    std::vector<double> next(state.size());
+  bool draw(std::size_t trial, std::vector<double> state, std::string& rows) const {
+    std::vector<double> next(state.size()), values = values_;
     std::uint64_t leg = trial % 2;
-    for (std::uint64_t step = 0; step < options_.longest; ++step, leg = 1 - leg) {
+    for (std::uint64_t step = 0;; ++step, leg = 1 - leg) {
       rows += fmt::format("{},{},{}", trial + 1, step + 1, leg + 1);
       for (std::size_t s = 0; s < state.size(); ++s)
         rows += fmt::format(",{:.9g}", state[s] + (s == 0 ? angle_error : rate_error_) * normal(trial, step, s + 1));
       rows += "\n";
-      if (!machine_.inputs.empty()) values_.back() = static_cast<double>(leg + 1);
+      if (step + 1 >= options_.longest) return false;
+      if (!machine_.inputs.empty()) values.back() = static_cast<double>(leg + 1);
       const double score = normal(trial, step, 0);
       std::uint8_t fell = 0;
       std::vector<std::span<const double>> spans;
-      for (const double& value : values_) spans.emplace_back(&value, 1);
+      for (const double& value : values) spans.emplace_back(&value, 1);
       machine_.step({1, state, {&score, 1}, spans, next, {&fell, 1}});
       if (fell) return true;
       state.swap(next);
     }
-    return false;
   }
 
  private:
@@ -265,20 +266,20 @@ Diagnosis diagnose_walks(const Walks& walks, const DiagnosisOptions& options) {
   return diagnose(std::move(model), options);
 }
 
-std::string walk_description(const WalkerSetting& setting, const std::vector<MeasuredState>& measured,
-                             const std::string& title, const std::vector<std::string>& comment) {
-  std::string toml;
-  for (const std::string& line : comment) toml += "# " + line + "\n";
-  toml += fmt::format(
+std::string walk_toml(const WalkStatement& statement) {
+  const WalkerSetting& setting = statement.walker.setting;
+  std::string text;
+  for (const std::string& line : statement.comment) text += "# " + line + "\n";
+  text += fmt::format(
       "title = {}\nsystem = \"machine\"\n\n[machine]\nmodel = \"{}\"\n\n[machine.parameters]   # nominal value, and "
       "the "
       "sd with which it is known\nslope_deg = {{ mean = {}, sd = {} }}\nslope_sd_deg = {{ mean = {}, sd = {} }}\n\n"
       "[columns]              # sd of the error of a measured value\n",
-      toml_text(title), walker_name(setting.walker), setting.slope_deg, WalkerStatement{}.slope_known_deg,
-      setting.slope_sd_deg, setting.slope_sd_deg);
-  for (const MeasuredState& one : measured)
-    toml += one.sd ? fmt::format("{} = {{ sd = {} }}\n", one.state, *one.sd) : fmt::format("{} = {{}}\n", one.state);
-  return toml;
+      toml_text(statement.title), walker_name(setting.walker), setting.slope_deg, statement.walker.slope_known_deg,
+      setting.slope_sd_deg, statement.walker.roughness_known_deg.value_or(setting.slope_sd_deg));
+  for (const auto& [state, sd] : statement.columns)
+    text += sd ? fmt::format("{} = {{ sd = {} }}\n", state, *sd) : fmt::format("{} = {{}}\n", state);
+  return text;
 }
 
 WalkFiles draw_walks(const WalkerSetting& setting, const std::vector<std::pair<std::string, double>>& effects,
@@ -290,22 +291,26 @@ WalkFiles draw_walks(const WalkerSetting& setting, const std::vector<std::pair<s
   const double rate_error = statement.legs ? compass_rate_error : simplest_rate_error;
   const std::vector<double> start =
       gait_state(setting, dynamics::find_gait(setting.map().walker(), setting.slope_deg * degree));
+  WalkStatement told{title, statement, {}};
   WalkFiles files;
   files.steps_csv = "trial,step,phase";
-  std::vector<MeasuredState> measured;
   for (const std::string& state : machine.states) {
     files.steps_csv += "," + state;
-    measured.push_back({state, state == "half_angle_rad" ? angle_error : rate_error});
+    told.columns.emplace_back(state, state == "half_angle_rad" ? angle_error : rate_error);
   }
-  files.experiment_toml = walk_description(setting, measured, title);
+  files.experiment_toml = walk_toml(told);
   files.steps_csv += "\n";
   files.trials_csv = "trial,outcome\n";
-  WalkDrawer drawer(machine, values_with(machine, effects), options, rate_error);
+  const WalkDrawer drawer(machine, values_with(machine, effects), options, rate_error);
+  std::vector<std::string> rows(options.trials);
+  std::vector<std::uint8_t> fell(options.trials);
+  markov::parallel_for(
+      options.trials, options.threads, [&](std::size_t trial) { fell[trial] = drawer.draw(trial, start, rows[trial]); },
+      options.progress);
   for (std::size_t trial = 0; trial < options.trials; ++trial) {
-    const bool fell = drawer.draw(trial, start, files.steps_csv);
-    files.fallen += fell;
-    files.trials_csv += fmt::format("{},{}\n", trial + 1, fell ? "failed" : "stopped");
-    if (options.progress) options.progress(static_cast<double>(trial + 1) / static_cast<double>(options.trials));
+    files.steps_csv += rows[trial];
+    files.fallen += fell[trial];
+    files.trials_csv += fmt::format("{},{}\n", trial + 1, fell[trial] ? "failed" : "stopped");
   }
   return files;
 }

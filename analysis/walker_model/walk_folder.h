@@ -41,25 +41,25 @@ std::optional<Walks> parse_walks(const ExperimentSource& source);
 ///   walks do not have, and for an effect of the catalogue that this machine does not know
 Diagnosis diagnose_walks(const Walks& walks, const DiagnosisOptions& options);
 
-/// A state that was measured.
-struct MeasuredState {
-  std::string state;         ///< its column
-  std::optional<double> sd;  ///< of a value's error; nothing: to be fitted
-};
-
-/// Writes experiment.toml of walks. @param comment  its lines come first, each behind "# "
-std::string walk_description(const WalkerSetting& setting, const std::vector<MeasuredState>& measured,
-                             const std::string& title, const std::vector<std::string>& comment = {});
-
 /// Holds the three files as text.
 struct WalkFiles {
   std::string experiment_toml, steps_csv, trials_csv;
   std::size_t fallen = 0;
 };
 
+/// Says what experiment.toml tells of a walker's walks.
+struct WalkStatement {
+  std::string title;
+  WalkerStatement walker;
+  std::vector<std::pair<std::string, std::optional<double>>> columns = {};  ///< states, with the sd of each one's error
+  std::vector<std::string> comment = {};                                    ///< its lines come first, behind "# "
+};
+/// Returns the experiment.toml that says so.
+std::string walk_toml(const WalkStatement& statement);
+
 /// Draws walks of a walker with effects, as WalkOptions says, which start in the gait of the ideal one, and measures
 /// them with errors of 0.0005 rad and, for the rates, 0.005 rad/s (simplest: 0.001). A row is a state just after a
-/// strike.
+/// strike; what becomes of the last row of WalkOptions::longest is not told.
 /// @param effects  parameters of walker_machine()'s effects, "hip_damping.damping" and values
 /// @throws std::invalid_argument for an effect or value that the machine does not have
 WalkFiles draw_walks(const WalkerSetting& setting, const std::vector<std::pair<std::string, double>>& effects,

@@ -10,6 +10,8 @@
 #include <stdexcept>
 #include <utility>
 
+#include "dynamics/catalogue/walker_effects.h"
+
 namespace metastable::dynamics {
 namespace {
 
@@ -199,7 +201,12 @@ const EffectInfo& effect_info(std::string_view id) {
 
 Effect effect_from_values(std::string_view id, const std::map<std::string, std::vector<double>>& values,
                           const NominalValues& nominal) {
-  const EffectInfo& info = effect_info(id);
+  return effect_from_values(effect_info(id), values, nominal);
+}
+
+Effect effect_from_values(const EffectInfo& info, const std::map<std::string, std::vector<double>>& values,
+                          const NominalValues& nominal) {
+  const std::string_view id = info.id;
   for (const auto& [name, given] : values)
     if (std::none_of(info.parameters.begin(), info.parameters.end(),
                      [&name = name](const EffectParameter& p) { return p.name == name; })) {
@@ -227,7 +234,8 @@ Effect effect_from_values(std::string_view id, const std::map<std::string, std::
   return effect;
 }
 
-Effect effect_from_text(std::string_view text, const NominalValues& nominal) {
+Effect effect_from_text(std::string_view text, const NominalValues& nominal,
+                        const EffectInfo& (*info_of)(std::string_view)) {
   const auto colon = text.find(':');
   const std::string_view id = text.substr(0, colon);
   std::map<std::string, std::vector<double>> values;
@@ -241,11 +249,11 @@ Effect effect_from_text(std::string_view text, const NominalValues& nominal) {
         throw std::invalid_argument(fmt::format("effect {}: {} is given twice", id, part.substr(0, equals)));
       for (const std::string_view one : split(part.substr(equals + 1), ';')) list.push_back(number(id, one));
     }
-  return effect_from_values(id, values, nominal);
+  return effect_from_values(info_of(id), values, nominal);
 }
 
 std::string effect_text(const Effect& effect) {
-  const EffectInfo& info = effect_info(effect.id);
+  const EffectInfo& info = any_effect_info(effect.id);
   std::string text = effect.id;
   std::size_t at = 0;
   for (std::size_t p = 0; p < info.parameters.size(); ++p) {

@@ -55,11 +55,15 @@ struct NominalValues {
 ///         out of range, no whole number where one is needed, a list of the wrong length, from_m >= to_m
 Effect effect_from_values(std::string_view id, const std::map<std::string, std::vector<double>>& values,
                           const NominalValues& nominal);
+Effect effect_from_values(const EffectInfo& info, const std::map<std::string, std::vector<double>>& values,
+                          const NominalValues& nominal);
 
 /// Reads "leg_contact:leg=3,friction_ratio=1.4" (the colon and what follows may be absent; a list is 0.15;0.151;...).
+/// @param info_of  the catalogue: a wheel's, or walker_effect_info
 /// @throws std::invalid_argument as effect_from_values, and for text that cannot be read (quotes it)
-Effect effect_from_text(std::string_view text, const NominalValues& nominal);
-/// Does the inverse, with every value in as many digits as it needs.
+Effect effect_from_text(std::string_view text, const NominalValues& nominal,
+                        const EffectInfo& (*info_of)(std::string_view) = effect_info);
+/// Does the inverse, of a wheel's effects and of a walker's, with every value in as many digits as it needs.
 std::string effect_text(const Effect& effect);
 
 }  // namespace metastable::dynamics

@@ -16,6 +16,7 @@ constexpr double longest_share = 30;    // of sqrt(length/gravity), that a strik
 constexpr double cord = 0.25;           // [m] of the load
 constexpr double drive_lag = 0.3;       // [s]
 constexpr double ramp_frequency = 0.6;  // [Hz]
+constexpr double ground = 1e-6;         // [m], over which a foot is not on it
 constexpr int projections = 2;          // from errors of 1e-9 to those of rounding
 
 using Eight = std::array<double, 8>;
@@ -142,14 +143,14 @@ double RodWalker::height(const State& s) const {
   return s[1] + share * (s[3 + 2 * i] - s[1]) - options_.foot_radius;
 }
 
-// Says whether the swing foot is further down the slope than the standing one.
-bool RodWalker::ahead(const State& s) const {
+// Returns how much further down the slope the swing foot is than the standing one.
+double RodWalker::lead(const State& s) const {
   double x[2];
   for (std::size_t i = 0; i < 2; ++i) {
     const double share = (options_.legs[i].length() - options_.foot_radius) / options_.legs[i].mass_to_hip;
     x[i] = s[0] + share * (s[2 + 2 * i] - s[0]);
   }
-  return x[1 - stance_] > x[stance_];
+  return x[1 - stance_] - x[stance_];
 }
 
 Eight RodWalker::forces(const State& s, double time) const {
@@ -229,6 +230,18 @@ double RodWalker::next_piece(double longest, State& end) {
   return longest;
 }
 
+// Returns when within the piece the swing foot comes down before the standing one; nothing if it does not. The slope of
+// the line from foot to foot is followed: where legs of one length pass each other it goes on smoothly.
+std::optional<double> RodWalker::landing(double passed, const State& end) const {
+  const auto slope = [this](const State& s) { return height(s) / lead(s); };
+  const double before = slope(state_), after = slope(end);
+  if (!(before > 0 && after <= 0)) return std::nullopt;
+  const double time = crossing([&](double t) { return slope(moved(t)); }, passed, before, after);
+  const State at = moved(time);
+  if (!(lead(at) > 0 && std::abs(height(at)) < ground)) return std::nullopt;
+  return time;
+}
+
 void RodWalker::arrive(const State& end, double passed) {
   if (turns_) {
     against_ = -against_;
@@ -298,12 +311,10 @@ bool RodWalker::reach_strike(double slope) {
   while (time_ - begun <= longest_share * unit) {
     State end;
     const double passed = next_piece(piece * unit, end);
-    const double before = height(state_), after = height(end);
-    if (ahead(state_) && ahead(end) && before > 0 && after <= 0) {
-      const double time = crossing([&](double t) { return height(moved(t)); }, passed, before, after);
-      const State struck = moved(time);
+    if (const auto time = landing(passed, end)) {
+      const State struck = moved(*time);
       turns_ = false;
-      arrive(struck, time);
+      arrive(struck, *time);
       return true;
     }
     arrive(end, passed);

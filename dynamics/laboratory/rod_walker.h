@@ -7,6 +7,7 @@
 
 #include <array>
 #include <cstddef>
+#include <optional>
 #include <vector>
 
 namespace metastable::dynamics {
@@ -87,11 +88,12 @@ class RodWalker {
   double rate(const State& s, int leg) const;
   double turning(const State& s) const { return rate(s, stance_) - rate(s, 1 - stance_); }
   double height(const State& s) const;
-  bool ahead(const State& s) const;
+  double lead(const State& s) const;
   std::array<double, 8> forces(const State& s, double time) const;
   void derivative(const State& s, State& ds, double time) const;
   State moved(double time) const;
   double next_piece(double longest, State& end);
+  std::optional<double> landing(double passed, const State& end) const;
   void arrive(const State& end, double passed);
   void project();
   void put_down(int stance, const RodStride& stride, double x);

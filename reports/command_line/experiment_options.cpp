@@ -9,6 +9,7 @@
 #include "analysis/experiment/suggestion.h"
 #include "analysis/walker_model/walk_folder.h"
 #include "analysis/wheel_model/wheel_transitions.h"
+#include "dynamics/catalogue/walker_effects.h"
 #include "dynamics/wheel/contact_law.h"
 #include "reports/command_line/command.h"
 #include "reports/command_line/option_values.h"
@@ -48,14 +49,15 @@ void add_laboratory_options(Options& o) {
   o.add("outside", "ID:SIZE", "",
         "With --reality, repeatable: an effect outside the catalogue (sloshing_fluid, planks, frame_resonance, "
         "stored_energy, speed_spread, double_plate, warming_feet, two_crews, loose_feet, second_memory, crosswind, "
-        "wet_day, daily_cycle, hysteresis, wearing_leg, rough_stretch, sticky_start, swaying_floor)");
+        "wet_day, daily_cycle, hysteresis, wearing_leg, rough_stretch, sticky_start, swaying_floor; with --walker "
+        "round_feet, hip_spring, slow_motor, swinging_load, swaying_ramp)");
   o.add("skewness", "G", "0", "With --reality: skewness of restitution, (-2, 2)");
   o.add("sensor-noise", "SD", "0", "With --reality: white noise of every reported speed [rad/s]",
         dynamics::range::speed);
   o.add("smoothing", "S", "0", "With --reality: reported speeds are means over this time, 0..0.1 [s]");
   o.add("drop", "NAME,...", "",
         "With --reality: columns and statements left out (leg, time_s, position_m, omega_plus_rad_s, outcome, "
-        "initial_speed_rad_s, noise)");
+        "initial_speed_rad_s, noise; with --walker phase, time_s, position_m, outcome)");
   o.add_flag("no-flight", "With --reality: feet that should lift stay on the ramp");
   o.add_flag("shuffle", "With --reality: conditions take turns at random");
 }
@@ -300,10 +302,46 @@ SimulateRequest simulate_request(const Options& o, const std::string& line, cons
   return request;
 }
 
+namespace {
+
+// @throws std::invalid_argument for text that is not of the form ID:SIZE
+std::vector<dynamics::OutsideEffect> outside_effects_in(const Options& o) {
+  std::vector<dynamics::OutsideEffect> all;
+  for (const std::string& text : o.all("outside")) {
+    const std::vector<std::string> parts = split(text, ':');
+    if (parts.size() != 2) throw std::invalid_argument(fmt::format("--outside: '{}' is not of the form ID:SIZE", text));
+    all.push_back({parts[0], number_value("outside", parts[1])});
+  }
+  return all;
+}
+
+analysis::WalkerReality walker_reality(const Options& o) {
+  analysis::WalkerReality reality;
+  std::vector<std::string> known;
+  for (const dynamics::EffectInfo& info : dynamics::walker_effects()) known.push_back(info.id);
+  for (const std::string& text : o.all("effect")) {
+    analysis::require_word("--effect", text.substr(0, text.find(':')), known);
+    reality.effects.push_back(dynamics::effect_from_text(text, {}, dynamics::walker_effect_info));
+  }
+  reality.outside = outside_effects_in(o);
+  if (o.given("drop")) reality.left_out = split(o.text("drop"), ',');
+  return reality;
+}
+
+}  // namespace
+
 WalkerRequest walker_simulate_request(const Options& o, const std::string& line) {
-  WalkerRequest walker = walker_request(o, line, {"trials", "collisions", "effect"});
+  std::vector<std::string> own{"trials", "collisions", "effect", "reality"};
+  if (o.flag("reality")) own.insert(own.end(), {"outside", "drop"});
+  for (const char* name : {"outside", "drop"})
+    if (o.given(name) && !o.flag("reality")) throw std::invalid_argument(fmt::format("--{}: needs --reality", name));
+  WalkerRequest walker = walker_request(o, line, own);
   walker.walks.trials = o.whole("trials", 1, 1000000);
   if (o.given("collisions")) walker.walks.longest = o.whole("collisions", 1, 1000000);
+  if (o.flag("reality")) {
+    walker.reality = walker_reality(o);
+    return walker;
+  }
   for (const std::string& text : o.all("effect")) {
     const std::vector<std::string> parts = split(text, ':');
     if (parts.size() != 2)
@@ -330,11 +368,7 @@ LaboratoryRequest laboratory_request(const Options& o, const SimulateRequest& pl
     analysis::require_word("--effect", text.substr(0, text.find(':')), effect_ids());
     reality.effects.push_back(dynamics::effect_from_text(text, stated));
   }
-  for (const std::string& text : o.all("outside")) {
-    const std::vector<std::string> parts = split(text, ':');
-    if (parts.size() != 2) throw std::invalid_argument(fmt::format("--outside: '{}' is not of the form ID:SIZE", text));
-    reality.outside.push_back({parts[0], number_value("outside", parts[1])});
-  }
+  reality.outside = outside_effects_in(o);
   reality.restitution_skewness = o.number("skewness");
   reality.sensor_noise = o.number("sensor-noise");
   reality.smoothing = o.number("smoothing");

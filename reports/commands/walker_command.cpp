@@ -198,12 +198,18 @@ void write_experiment(const WalkerRequest& request, OutputFolder& whole) {
     analysis::WalkOptions options = request.walks;
     options.progress = [tell = progress.begin()("simulate")](double share) { tell(share, "simulate"); };
     const WalkerSetting& setting = request.settings.front();
+    if (request.reality) {
+      const auto laboratory = analysis::walker_laboratory(setting, *request.reality, options);
+      return analysis::laboratory_walks(laboratory, analysis::run_walks(laboratory, options),
+                                        {"Compass gait in the virtual laboratory", {setting}, {}},
+                                        request.reality->left_out);
+    }
     return analysis::draw_walks(setting, request.effects, options,
                                 fmt::format("Walker {}, simulated", analysis::walker_name(setting.walker)));
   }();
   write_file(whole.path() / "experiment.toml", files.experiment_toml);
   write_file(whole.path() / "steps.csv", files.steps_csv);
-  write_file(whole.path() / "trials.csv", files.trials_csv);
+  if (!files.trials_csv.empty()) write_file(whole.path() / "trials.csv", files.trials_csv);
   whole.commit("experiment.toml");
   say_walks(answer, request, request.walks.trials, files.fallen, walker_provenance(request));
 }
@@ -219,7 +225,7 @@ void run_walker_simulate(const WalkerRequest& request) {
   if (setting.terrain != dynamics::Terrain::fresh && !request.effects.empty())
     throw std::invalid_argument("--effect: has no meaning with --terrain facets");
   OutputFolder whole(folder);
-  if (setting.terrain == dynamics::Terrain::fresh) return write_experiment(request, whole);
+  if (setting.terrain == dynamics::Terrain::fresh || request.reality) return write_experiment(request, whole);
   Answer answer(request.json);
   const std::vector<analysis::Walk> walks = [&] {
     ProgressParts progress;

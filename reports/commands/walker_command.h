@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "analysis/statistics/last_moments.h"
+#include "analysis/walker_model/walker_experiment.h"
 #include "analysis/walkers/walker_study.h"
 #include "analysis/walkers/walker_trials.h"
 #include "reports/study/splitting_text.h"
@@ -37,6 +38,7 @@ struct WalkerRequest {
   std::vector<double> slopes, slope_sds;                     ///< [deg], the axes of a sweep: settings slope by slope
   analysis::WalkOptions walks = {};                          ///< of simulate
   std::vector<std::pair<std::string, double>> effects = {};  ///< of simulate: "hip_damping.damping" and values
+  std::optional<analysis::WalkerReality> reality = {};       ///< of simulate, in the laboratory, with effects of its own
   const struct Sharing* sharing = nullptr;                   ///< of a sweep, with other processes
 };
 
@@ -73,7 +75,7 @@ void run_walker_compare(const WalkerRequest& request);
 /// Writes expected steps over slopes and their sds; it is taken up again like every sweep.
 void run_walker_sweep(const WalkerRequest& request);
 
-/// Writes an experiment folder of walks (experiment.toml, steps.csv, trials.csv); with terrain that remembers,
+/// Writes an experiment folder of walks (experiment.toml, steps.csv, trials.csv), of the model or of the laboratory; with terrain that remembers,
 /// walks.csv (every step, exact) and trials.csv.
 void run_walker_simulate(const WalkerRequest& request);
 

@@ -93,15 +93,15 @@ std::string description_of(const ImportRequest& request, const std::vector<Impor
     return text + read_file(request.description);
   }
   if (request.walker) {
-    std::vector<analysis::MeasuredState> measured;
+    analysis::WalkStatement told{request.title, {*request.walker}, {}, comment};
     for (const Role role : {Role::half_angle, Role::stance_rate, Role::swing_rate}) {
       if (std::ranges::none_of(rows, [&](const ImportedRow& row) { return (row.*value_member(role)).has_value(); }))
         continue;
       const auto error = std::ranges::find(request.errors, role, &std::pair<Role, double>::first);
-      measured.push_back({std::string(column_in_folder(role)),
-                          error == request.errors.end() ? std::nullopt : std::optional(error->second)});
+      told.columns.emplace_back(std::string(column_in_folder(role)),
+                                error == request.errors.end() ? std::nullopt : std::optional(error->second));
     }
-    return analysis::walk_description(*request.walker, measured, request.title, comment);
+    return analysis::walk_toml(told);
   }
   std::vector<std::pair<std::string, double>> slopes = request.slopes;
   if (slopes.empty()) {

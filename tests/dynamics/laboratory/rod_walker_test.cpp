@@ -53,6 +53,7 @@ Agreement agreement(const UnevenWalker& model, const RodWalkerOptions& real, int
       continue;
     }
     ++found.walked;
+    if (walker.time() > 1.5) continue;  // it nearly fell back: what rounding leaves has grown
     const RodStride to = walker.stride();
     found.worst = std::max({found.worst, std::abs(to.half_angle - next[0]), std::abs(to.stance_rate - next[1]),
                             std::abs(to.swing_rate - next[2])});
