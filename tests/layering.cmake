@@ -35,7 +35,7 @@ set(ROOMS
   "analysis/machine_model: dynamics/numerics analysis/statistics analysis/fitting"
   "analysis/walker_model: markov dynamics/numerics dynamics/catalogue dynamics/laboratory dynamics/walkers analysis/statistics analysis/walkers analysis/diagnosis analysis/experiment analysis/machine_model"
   "analysis/experiment_model: analysis/fitting analysis/diagnosis analysis/experiment analysis/wheel_model analysis/drum_model"
-  "analysis/blind: dynamics/numerics dynamics/catalogue analysis/statistics analysis/fitting analysis/diagnosis analysis/experiment analysis/wheel_model"
+  "analysis/blind: dynamics/numerics dynamics/catalogue dynamics/laboratory analysis/statistics analysis/walkers analysis/fitting analysis/diagnosis analysis/experiment analysis/wheel_model analysis/machine_model analysis/walker_model"
   "analysis/motion_capture: markov dynamics/extended_wheel dynamics/return_map analysis/statistics analysis/experiment"
   "analysis/paper: markov dynamics/numerics dynamics/catalogue dynamics/settled dynamics/return_map analysis/statistics analysis/study analysis/experiment analysis/description"
   "analysis/sensitivity: markov markov/chain markov/passage markov/transition_rows dynamics/wheel dynamics/settled dynamics/return_map analysis/statistics analysis/study"

@@ -6,7 +6,6 @@
 #include <tuple>
 
 #include "analysis/diagnosis/at_work.h"
-#include "dynamics/catalogue/effect_catalogue.h"
 
 namespace metastable::analysis {
 namespace {
@@ -59,9 +58,7 @@ void count_kind(AtWorkTally& tally, const BlindTruth& truth, const Answer& answe
     case BlindKind::outside:
       return tally.outside.count(wrong);
     case BlindKind::effect:
-      if (truth.strength < 2 || truth.left < power_of_one ||
-          truth.effects.front().id == dynamics::contact_distribution_id)
-        return;
+      if (truth.strength < 2 || truth.left < power_of_one || is_recalibration(truth.effects.front().id)) return;
       tally.one.count(right == 1);
       return tally.second.count(wrong);
     case BlindKind::pair:

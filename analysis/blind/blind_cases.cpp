@@ -13,8 +13,12 @@
 
 #include "analysis/blind/blind_dice.h"
 #include "analysis/blind/outside_power.h"
+#include "analysis/blind/size_search.h"
 #include "analysis/blind/sized_effect.h"
+#include "analysis/blind/walker_cases.h"
 #include "analysis/experiment/stand_in.h"
+#include "dynamics/catalogue/walker_effects.h"
+#include "dynamics/laboratory/walker_laboratory.h"
 
 namespace metastable::analysis {
 namespace {
@@ -27,38 +31,14 @@ constexpr std::array<std::pair<std::string_view, BlindKind>, 7> kinds{{{"none", 
                                                                        {"mixed", BlindKind::mixed},
                                                                        {"many", BlindKind::many}}};
 
-// It is the nuisances of every model, which recalibration removes: no candidate to be left out or paired.
-constexpr std::string_view recalibration = dynamics::contact_distribution_id;
-
-// Finds the size whose power is `target`. Powers grow like a power of a small size, mostly its square: it takes secant
-// steps in logarithms, inside the bracket known so far. A large effect may stop every trial at once, which leaves no
-// power: sizes beyond one from which it falls are not looked at. Returns the size tried that came nearest.
-// @param start  has a power of about 16, or less
-double find_size(double start, double largest, double target, const std::function<double(double)>& power) {
-  double size = std::min(start * std::sqrt(target / 16), largest);
-  double low = 0, high = largest, exponent = 2;
-  double last_size = 0, last_power = 0, best = size, nearest = std::numeric_limits<double>::infinity();
-  for (int i = 0; i < 10; ++i) {
-    const double now = power(size), off = std::abs(std::log(std::max(now, 1e-9) / target));
-    if (off < nearest) nearest = off, best = size;
-    if (std::abs(now / target - 1) < 0.1) break;
-    if (size > last_size && now < 0.8 * last_power) {
-      high = size;
-      size = (low + high) / 2;
-      continue;
-    }
-    if (now < target && size == largest) break;
-    (now < target ? low : high) = size;
-    if (now > 0 && last_power > 0 && size != last_size)
-      exponent = std::clamp(std::log(now / last_power) / std::log(size / last_size), 0.7, 3.0);
-    last_size = size;
-    last_power = now;
-    double next = now > 0.02 * target ? size * std::pow(target / now, 1 / exponent) : 3 * size;
-    next = std::min(next, largest);
-    if (next <= low || (next >= high && high < largest)) next = (low + high) / 2;
-    size = next;
-  }
-  return best;
+// What cases can be of.
+struct CaseCatalogue {
+  const std::vector<dynamics::EffectInfo>& effects;
+  const std::vector<dynamics::OutsideInfo>& outside;
+};
+CaseCatalogue catalogue_of(const BlindSize& size) {
+  if (size.walkers) return {dynamics::walker_effects(), dynamics::walker_outside_effects()};
+  return {dynamics::effect_catalogue(), dynamics::outside_effects()};
 }
 
 Setting base_setting(dynamics::Law law) {
@@ -166,7 +146,7 @@ void size_outside(const BlindPlan& plan, double target, const Power& power, Blin
 FolderOptions draw_statement(const BlindPlan& plan, BlindTruth& truth, BlindDice& dice) {
   FolderOptions folder;
   folder.title = fmt::format("Blind case {}", truth.number);
-  const bool recalibrated = plan.kind == BlindKind::effect && plan.effects.front() == recalibration;
+  const bool recalibrated = plan.kind == BlindKind::effect && is_recalibration(plan.effects.front());
   truth.nominal_is_true = dice.chance(0.5) || recalibrated;
   folder.restitution = truth.restitution;
   folder.friction = truth.friction;
@@ -194,6 +174,10 @@ BlindKind blind_kind(std::string_view name) {
     if (known == name) return kind;
   throw std::invalid_argument(
       fmt::format("kind: \"{}\" is none of none, effect, pair, outside, left_out, mixed, many", name));
+}
+
+bool is_recalibration(std::string_view effect) {
+  return effect == dynamics::contact_distribution_id || effect == dynamics::slope_offset_id;
 }
 
 bool can_be_had(std::string_view effect, dynamics::Law law) {
@@ -238,6 +222,7 @@ std::vector<BlindPlan> blind_plan(const BlindSize& size, std::uint64_t seed) {
   };
   const auto add = [&](BlindPlan one) {
     one.law = size.laws[turn[one.kind] % size.laws.size()];
+    one.walker = size.walkers;
     if (had(one, one.law)) {
       ++turn[one.kind];
     } else {
@@ -249,10 +234,12 @@ std::vector<BlindPlan> blind_plan(const BlindSize& size, std::uint64_t seed) {
   };
   for (int n = 0; n < size.none; ++n) add({BlindKind::none, {}, 0});
   std::vector<std::string> paired;
-  for (const dynamics::EffectInfo& info : dynamics::effect_catalogue()) {
+  const CaseCatalogue catalogue = catalogue_of(size);
+  for (const dynamics::EffectInfo& info : catalogue.effects) {
     for (const int strength : {1, 2, 4})
       for (int n = 0; n < size.per_effect_and_strength; ++n) add({BlindKind::effect, {info.id}, strength});
-    if (info.id == recalibration) continue;
+    // It is the nuisances of every model, which recalibration removes: no candidate to be left out or paired.
+    if (is_recalibration(info.id)) continue;
     for (int n = 0; n < size.left_out_per_effect; ++n) add({BlindKind::left_out, {info.id}, 2});
     // An effect without a size is there or not: it cannot be made as visible as another one beside it.
     if (!info.parameters.empty() && law_of({BlindKind::pair, {info.id}, 2}) != size.laws.end())
@@ -271,7 +258,7 @@ std::vector<BlindPlan> blind_plan(const BlindSize& size, std::uint64_t seed) {
     return one.effects;
   };
   for (int p = 0; p < size.pairs; ++p) add({BlindKind::pair, several(2), 2});
-  const auto& outside = dynamics::outside_effects();
+  const auto& outside = catalogue.outside;
   const auto family = [&](int n) { return outside[static_cast<std::size_t>(n) % outside.size()].id; };
   for (int o = 0; o < size.outside; ++o)
     add({BlindKind::outside, {}, static_cast<std::size_t>(o) / outside.size() % 2 == 0 ? 2 : 4, {}, family(o)});
@@ -284,6 +271,7 @@ std::vector<BlindPlan> blind_plan(const BlindSize& size, std::uint64_t seed) {
 }
 
 BlindCase blind_case(const BlindPlan& plan, int number, std::uint64_t seed, const Power& power) {
+  if (plan.walker) return walker_case(plan, number, seed);
   BlindDice dice(seed, static_cast<std::uint64_t>(number));
   BlindCase made;
   BlindTruth& truth = made.truth;
@@ -324,6 +312,7 @@ BlindCase blind_case(const BlindPlan& plan, int number, std::uint64_t seed, cons
 
 void complete_truth(BlindCase& made) {
   BlindTruth& truth = made.truth;
+  if (made.walks) return complete_walker_truth(made);
   const bool outside = truth.outside && can_be_weighed(truth.outside->id);
   if (truth.effects.empty() && !outside) return;
   const Experiment experiment = parse_experiment(source_of(made.files.files, fmt::format("case {}", truth.number)));
@@ -333,14 +322,19 @@ void complete_truth(BlindCase& made) {
 }
 
 void complete_each(BlindTruth& truth, const Experiment& experiment) {
+  const dynamics::NominalValues contact = stated_values(truth.restitution, truth.friction, experiment.wheel.leg_length);
+  complete_each(truth, [&](const auto& others) { return power_left(experiment, contact, truth.effects, others); });
+}
+
+void complete_each(BlindTruth& truth,
+                   const std::function<double(const std::vector<dynamics::Effect>& others)>& left_beside) {
   truth.left_by_effect.clear();
   if (truth.kind == BlindKind::mixed && truth.effects.size() == 1) truth.left_by_effect = {truth.left};
   if (truth.effects.size() < 2) return;
-  const dynamics::NominalValues contact = stated_values(truth.restitution, truth.friction, experiment.wheel.leg_length);
   for (std::size_t one = 0; one < truth.effects.size(); ++one) {
     std::vector<dynamics::Effect> others = truth.effects;
     others.erase(others.begin() + static_cast<std::ptrdiff_t>(one));
-    truth.left_by_effect.push_back(power_left(experiment, contact, truth.effects, others));
+    truth.left_by_effect.push_back(left_beside(others));
   }
 }
 

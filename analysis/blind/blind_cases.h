@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "analysis/blind/effect_power.h"
+#include "analysis/walker_model/walk_folder.h"
 
 namespace metastable::analysis {
 
@@ -38,7 +39,10 @@ struct BlindSize {
   std::vector<dynamics::Law> laws = {dynamics::Law::published};
   int mixed = 0;
   int many = 0;
+  bool walkers = false;  ///< cases of the compass gait (laws then have no meaning) instead of the wheel
 };
+/// Says whether it is the effect that a recalibration removes: other contacts, another mean slope.
+bool is_recalibration(std::string_view effect);
 /// Says whether the laboratory has cases of an effect, of the catalogue or outside, under a law. Under settled it has
 /// none of what acts on the loss of a collision, of slip_reversal, sloshing_fluid, and of inertia, which is
 /// recalibrated; under the other laws none of soft_contact.
@@ -66,13 +70,17 @@ struct BlindTruth {
   double noise = 0;  ///< of reported speeds [rad/s]
   std::uint64_t seed = 0;
   std::vector<std::string> left_out;  ///< of the catalogue
+  /// The compass gait's true slope and its sd from step to step [deg]; nothing for a wheel. Its cases have no law, no
+  /// restitution, friction and skewness; `noise` is that of the half angle [rad].
+  std::optional<Spread> slope_deg = {};
 };
 
 /// Holds a case as it is written: public files, and the truth.
 struct BlindCase {
   BlindTruth truth;
-  LaboratoryFiles files;
-  std::vector<std::string> catalogue;  ///< ids the diagnosis may use; empty: all
+  LaboratoryFiles files;                ///< of a wheel
+  std::optional<WalkFiles> walks = {};  ///< of a compass gait
+  std::vector<std::string> catalogue;   ///< ids the diagnosis may use; empty: all
 };
 
 /// Gives the expected 2 Delta log likelihood of effects in a design (expected_power(), or a stand-in in tests).
@@ -85,6 +93,7 @@ struct BlindPlan {
   int strength = 0;
   dynamics::Law law = dynamics::Law::published;
   std::string outside = {};  ///< id of what no catalogue holds; empty: nothing
+  bool walker = false;       ///< of the compass gait
 };
 /// @throws std::invalid_argument naming a count below 0, or a law that is neither published nor settled
 std::vector<BlindPlan> blind_plan(const BlindSize& size, std::uint64_t seed);
@@ -93,14 +102,19 @@ std::vector<BlindPlan> blind_plan(const BlindSize& size, std::uint64_t seed);
 /// effects for 64, and what no catalogue holds beside them for half of that to twice as much); an effect that cannot be
 /// made so strong within its range keeps its largest size, and truth.power tells. An outside effect that cannot be
 /// weighed (outside_power.h) has its strength by its size alone. truth.left is not worked out: a case that is graded
-/// takes complete_truth() too.
+/// takes complete_truth() too. A walker's case has a power of its own.
 BlindCase blind_case(const BlindPlan& plan, int number, std::uint64_t seed, const Power& power);
 
 /// Sets truth.left from the case's own files; a case without an effect that can be weighed keeps 0. A fit takes about a
 /// second.
 void complete_truth(BlindCase& made);
 /// Sets truth.left_by_effect of a case of several effects, by a fit each; other kinds stay as they are.
-/// @param experiment  the case as it was written
+/// @param experiment, walks  the case as it was written
 void complete_each(BlindTruth& truth, const Experiment& experiment);
+void complete_each(BlindTruth& truth, const Walks& walks);
+/// Does so by what the effect is worth beside the others.
+/// @param left_beside  takes the others
+void complete_each(BlindTruth& truth,
+                   const std::function<double(const std::vector<dynamics::Effect>& others)>& left_beside);
 
 }  // namespace metastable::analysis

@@ -9,7 +9,9 @@
 
 #include "analysis/blind/at_work_grade.h"
 #include "analysis/blind/sized_effect.h"
+#include "analysis/blind/sized_walker_effect.h"
 #include "analysis/statistics/interval_95.h"
+#include "dynamics/catalogue/walker_effects.h"
 
 namespace metastable::analysis {
 namespace {
@@ -69,7 +71,7 @@ std::string asked(const BlindTruth& truth) {
 std::optional<double> true_value(const BlindTruth& truth, const std::string& effect, const std::string& name) {
   for (const dynamics::Effect& e : truth.effects) {
     if (e.id != effect) continue;
-    const dynamics::EffectInfo& info = dynamics::effect_info(effect);
+    const dynamics::EffectInfo& info = dynamics::any_effect_info(effect);
     for (std::size_t p = 0; p < info.parameters.size(); ++p)
       if (info.parameters[p].name == name && !info.parameters[p].per_leg) return e.values[p];
   }
@@ -113,7 +115,7 @@ void count_effect(Tally& tally, const BlindTruth& truth, const Answer& answer) {
   const std::string& id = truth.effects.front().id;
   const int strength = truth.strength;
   const bool in_set = answer && contains(answer->cause_set, id);
-  const bool left = id != dynamics::contact_distribution_id && truth.left >= no_power_left;
+  const bool left = !is_recalibration(id) && truth.left >= no_power_left;
   tally.found[strength].count(answer && answer->verdict != Verdict::no_gap);
   if (left) {
     tally.found_left[strength].count(gap(answer));
@@ -122,7 +124,7 @@ void count_effect(Tally& tally, const BlindTruth& truth, const Answer& answer) {
     tally.absorbed.count(in_set || taken_for_contact(answer));
   }
   if (left && strength >= 2) {
-    const std::vector<std::string>& places = rightful_places(id);
+    const std::vector<std::string>& places = truth.slope_deg ? rightful_walker_places(id) : rightful_places(id);
     tally.facet[strength].count(answer && std::any_of(answer->where.begin(), answer->where.end(), [&](const auto& w) {
                                   return w.p_adjusted <= claim &&
                                          (contains(places, w.facet) || contains(places, ":" + w.aspect));
@@ -215,7 +217,7 @@ void count_way(WayGrade& grade, const BlindTruth& truth, const std::vector<std::
     case BlindKind::none:
       return grade.alarms.count(!named.empty());
     case BlindKind::effect:
-      if (truth.effects.front().id == dynamics::contact_distribution_id || truth.left < no_power_left) return;
+      if (is_recalibration(truth.effects.front().id) || truth.left < no_power_left) return;
       grade.exact.count(right == 1 && named.size() == 1);
       grade.in.count(right == 1);
       return grade.wrong.count(named.size() > right);

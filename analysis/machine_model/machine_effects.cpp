@@ -111,6 +111,7 @@ class Varying {
       one.candidate.variants.resize(1);  // the other differs by the same, and the nominal is fitted
     if (design_.phases.size() < 2) one.candidate.undecidable = "the runs have no column of phases with two of them";
     one.candidate.report = changed_in(design_.phases);
+    one.candidate.form_of = [](const Values& v) { return FittedForm{{0}, {v[0]}}; };  // of the first phase
     one.apply = adding([](const StepPlace& at, const Values& variant, std::size_t) {
       return at.phase == static_cast<int>(variant[0]) ? 1.0 : 0.0;
     });
@@ -154,6 +155,7 @@ class Varying {
     one.candidate.report = [](const Values& variant, const Values& v) {
       return std::vector<NamedValue>{{"amplitude", std::hypot(v[0], v[1])}, {"frequency_hz", variant[0]}};
     };
+    one.candidate.form_of = [](const Values& v) { return FittedForm{{v[1]}, {v[0], 0}}; };  // it begins at its height
     one.apply = adding([first = design_.first_time](const StepPlace& at, const Values& variant, std::size_t i) {
       const double angle = 2 * std::numbers::pi * variant[0] * (at.time - first);
       return i == 0 ? std::cos(angle) : std::sin(angle);
@@ -175,6 +177,7 @@ class Varying {
       one.candidate.undecidable = "the runs have no position_m for every row";
     }
     one.candidate.report = reporting({"from_m", "to_m"}, {"change"});
+    one.candidate.form_of = [](const Values& v) { return FittedForm{{v[1], v[2]}, {v[0]}}; };
     one.apply = adding([](const StepPlace& at, const Values& variant, std::size_t) {
       return at.position >= variant[0] && at.position < variant[1] ? 1.0 : 0.0;
     });

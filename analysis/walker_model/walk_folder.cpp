@@ -266,6 +266,13 @@ Diagnosis diagnose_walks(const Walks& walks, const DiagnosisOptions& options) {
   return diagnose(std::move(model), options);
 }
 
+ExperimentSource source_of(const WalkFiles& files, const std::string& name) {
+  ExperimentSource source{name, files.experiment_toml, {}, {}, {}};
+  source.steps_csv = files.steps_csv;
+  if (!files.trials_csv.empty()) source.trials_csv = files.trials_csv;
+  return source;
+}
+
 std::string walk_toml(const WalkStatement& statement) {
   const WalkerSetting& setting = statement.walker.setting;
   std::string text;

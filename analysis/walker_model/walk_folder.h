@@ -57,6 +57,9 @@ struct WalkStatement {
 /// Returns the experiment.toml that says so.
 std::string walk_toml(const WalkStatement& statement);
 
+/// Returns the texts as a folder of that name holds them.
+ExperimentSource source_of(const WalkFiles& files, const std::string& name);
+
 /// Draws walks of a walker with effects, as WalkOptions says, which start in the gait of the ideal one, and measures
 /// them with errors of 0.0005 rad and, for the rates, 0.005 rad/s (simplest: 0.001). A row is a state just after a
 /// strike; what becomes of the last row of WalkOptions::longest is not told.

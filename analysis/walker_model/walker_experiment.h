@@ -13,7 +13,7 @@ namespace metastable::analysis {
 struct WalkerReality {
   std::vector<dynamics::Effect> effects = {};
   std::vector<dynamics::OutsideEffect> outside = {};
-  double launch_spread = 0;             ///< WalkerLaboratorySetup::launch_spread
+  double launch_spread = 0;                ///< WalkerLaboratorySetup::launch_spread
   std::vector<std::string> left_out = {};  ///< of walk_columns_left_out(): not written
 };
 /// Lists the names that WalkerReality::left_out may hold: phase, time_s, position_m, outcome.

@@ -14,7 +14,7 @@ constexpr double feet = 1e-9;  // mass of the simplest walker's feet, in masses 
 // The index of each value in MachineBatch::values.
 struct Places {
   std::size_t slope = 0, slope_sd = 1, damping = 2, torque = 3, loss = 4, slip = 5, mass_ratio = 6, higher = 7,
-              stance_leg = 8;
+              longer = 8, stance_leg = 9;
 };
 
 dynamics::UnevenWalker ideal(Walker walker) {
@@ -38,6 +38,7 @@ dynamics::UnevenWalker walker_of(const WalkerStatement& s, const MachineBatch& b
   first.mass *= batch.value(at.mass_ratio, i);
   first.foot_to_mass += batch.value(at.higher, i);
   first.mass_to_hip -= batch.value(at.higher, i);
+  first.foot_to_mass += batch.value(at.longer, i);
   return w;
 }
 
@@ -85,6 +86,7 @@ Machine walker_machine(const WalkerStatement& statement) {
                      {"foot_slip", {{"slip", 0, 0, 0.2}}}};
   if (!compass || !statement.legs) return machine;
   machine.effects.push_back({"leg_mass", {{"mass_ratio", 1, 0.5, 2}, {"higher", 0, -0.2, 0.2}}});
+  machine.effects.push_back({"leg_length", {{"longer", 0, -0.05, 0.05}}});
   machine.inputs = {"stance_leg"};
   return machine;
 }

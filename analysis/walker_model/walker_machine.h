@@ -24,7 +24,8 @@ struct WalkerStatement {
 ///   impact_loss       share of the energy that a strike takes beyond the plastic one
 ///   foot_slip         slip [m] of the struck foot as it is loaded
 ///   leg_mass          of leg 1: mass_ratio, and higher [m], by which its mass sits nearer to the hip
-/// The last is the compass's where it is known which leg stands. Of the simplest walker damping and torque are
+///   leg_length        of leg 1: longer [m], by which it reaches further below its mass
+/// The last two are the compass's where it is known which leg stands. Of the simplest walker damping and torque are
 /// those on the swing leg over its inertia, [sqrt(g/l)] and [g/l], and slip is in legs.
 /// @throws std::invalid_argument for a setting out of range, and for terrain that remembers
 Machine walker_machine(const WalkerStatement& statement);

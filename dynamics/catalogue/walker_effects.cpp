@@ -3,9 +3,9 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <array>
 #include <ranges>
 #include <stdexcept>
+#include <tuple>
 
 namespace metastable::dynamics {
 namespace {
@@ -38,6 +38,9 @@ std::vector<EffectInfo> make_effects() {
        "the mass of leg 1 differs from the stated one, in size or place",
        {sized("mass_ratio", "", 0.5, 2, "the mass over the stated one", 1),
         sized("higher", "m", -0.2, 0.2, "by which it sits nearer to the hip")}},
+      {"leg_length",
+       "leg 1 is longer than stated",
+       {sized("longer", "m", -0.05, 0.05, "by which it reaches further below its mass")}},
       {"slope_offset",
        "the mean slope differs from the stated one",
        {sized("offset_deg", "deg", -2, 2, "added to it")}},
@@ -67,8 +70,9 @@ std::vector<EffectInfo> make_effects() {
        "some steps meet a slope from a spread four times as wide",
        {sized("share", "", 0, 0.2, "of the steps")}},
   };
-  for (const auto& [state, unit, most] :
-       {std::tuple("half_angle_rad", "rad", 0.02), {"stance_rate_rad_s", "rad/s", 0.2}, {"swing_rate_rad_s", "rad/s", 0.2}}) {
+  for (const auto& [state, unit, most] : {std::tuple("half_angle_rad", "rad", 0.02),
+                                          {"stance_rate_rad_s", "rad/s", 0.2},
+                                          {"swing_rate_rad_s", "rad/s", 0.2}}) {
     all.push_back({fmt::format("sensor_noise_{}", state),
                    fmt::format("the sensor of {} is noisier than stated", state),
                    {sized("sd", unit, 0, most, "of an error beside the stated one")}});

@@ -11,7 +11,7 @@ namespace {
 
 namespace odeint = boost::numeric::odeint;
 
-constexpr double piece = 0.07;           // of sqrt(length/gravity): a Runge-Kutta step; halving it moves a step by 1e-10
+constexpr double piece = 0.07;          // of sqrt(length/gravity): a Runge-Kutta step; halving it moves a step by 1e-10
 constexpr double longest_share = 30;    // of sqrt(length/gravity), that a strike may take
 constexpr double cord = 0.25;           // [m] of the load
 constexpr double drive_lag = 0.3;       // [s]
@@ -36,8 +36,8 @@ double crossing(const Value& value, double longest, double at_zero, double at_lo
 struct Constraints {
   std::size_t rows = 4, coordinates = 6;
   std::array<Eight, 5> by{};
-  Five turning{};     // what the acceleration of a constraint has without accelerations
-  Five off{};         // by how much the positions violate it
+  Five turning{};  // what the acceleration of a constraint has without accelerations
+  Five off{};      // by how much the positions violate it
   Eight inverse_mass{};
 
   void rod(std::size_t row, const double* s, std::size_t from, std::size_t to, double length) {
@@ -376,8 +376,8 @@ double RodWalker::energy(double slope) const {
   const double apart = angle(state_, stance_) - angle(state_, 1 - stance_);
   double sum = 0.5 * options_.hip_spring * apart * apart;
   for (const RodPoint& p : points())
-    sum += p.mass * (0.5 * (p.vx * p.vx + p.vy * p.vy) +
-                     options_.gravity * (p.y * std::cos(slope) - p.x * std::sin(slope)));
+    sum += p.mass *
+           (0.5 * (p.vx * p.vx + p.vy * p.vy) + options_.gravity * (p.y * std::cos(slope) - p.x * std::sin(slope)));
   return sum;
 }
 

@@ -72,11 +72,11 @@ class RodWalker {
 
   int stance_leg() const { return stance_; }
   RodStride stride() const;
-  double time() const { return time_; }                   ///< since it was put down [s]
-  double position() const { return foot(stance_)[0]; }    ///< of the standing foot, downhill [m]
+  double time() const { return time_; }                       ///< since it was put down [s]
+  double position() const { return foot(stance_)[0]; }        ///< of the standing foot, downhill [m]
   double swing_foot() const { return foot(1 - stance_)[0]; }  ///< of the other one
-  std::vector<RodPoint> points() const;                   ///< hip, leg 0, leg 1 and, if there is one, the load
-  double energy(double slope) const;                      ///< of motion, height and spring [J]; the ramp at rest
+  std::vector<RodPoint> points() const;                       ///< hip, leg 0, leg 1 and, if there is one, the load
+  double energy(double slope) const;                          ///< of motion, height and spring [J]; the ramp at rest
 
  private:
   // Positions x, y of hip, leg 0, leg 1, load; their velocities; the motor's torque on leg 1.

@@ -21,8 +21,8 @@ namespace metastable::dynamics {
 namespace {
 
 constexpr double radians = std::numbers::pi / 180;
-constexpr double outlier_ratio = 4;  // of the slope's spread, as the catalogue has it
-constexpr double clock_for_a_step = 2;   // [s] that the clock leaves for a step of each trial
+constexpr double outlier_ratio = 4;     // of the slope's spread, as the catalogue has it
+constexpr double clock_for_a_step = 2;  // [s] that the clock leaves for a step of each trial
 
 // What draws are for; those of wheels are 100 to 102.
 enum class WalkDraw : std::uint64_t { slope = 110, sensor = 111, noise = 112, trial = 113, sway = 114 };
@@ -99,6 +99,7 @@ WalkerLaboratory::WalkerLaboratory(WalkerLaboratorySetup setup) : setup_(std::mo
          RodLeg& leg = walker_.legs[0];
          leg = {leg.mass * v[0], leg.foot_to_mass + v[1], leg.mass_to_hip - v[1]};
        }},
+      {"leg_length", [&](Values v) { walker_.legs[0].foot_to_mass += v[0]; }},
       {"slope_offset", [&](Values v) { terrain_.offset = v[0]; }},
       {"slope_deg_by_phase", [&](Values v) { terrain_.by_phase = v[0]; }},
       {"slope_deg_drift", [&](Values v) { terrain_.drift = v[0]; }},
@@ -118,8 +119,8 @@ WalkerLaboratory::WalkerLaboratory(WalkerLaboratorySetup setup) : setup_(std::mo
     const EffectInfo& info = walker_effect_info(effect.id);
     std::map<std::string, std::vector<double>> named;
     if (effect.values.size() != info.parameters.size())
-      throw std::invalid_argument(fmt::format("effect {}: {} values, {} are needed", effect.id, effect.values.size(),
-                                              info.parameters.size()));
+      throw std::invalid_argument(
+          fmt::format("effect {}: {} values, {} are needed", effect.id, effect.values.size(), info.parameters.size()));
     for (std::size_t p = 0; p < info.parameters.size(); ++p) named[info.parameters[p].name] = {effect.values[p]};
     effect_from_values(info, named, {});
     if (!seen.insert(effect.id).second) throw std::invalid_argument(fmt::format("effect {}: given twice", effect.id));

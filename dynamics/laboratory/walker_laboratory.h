@@ -27,15 +27,15 @@ const OutsideInfo& walker_outside_info(std::string_view id);
 
 /// Says what is walked. Without effects it is the stated model, on slopes N(slope, sd^2) from step to step.
 struct WalkerLaboratorySetup {
-  double slope_deg = 3;                                    ///< (0, 45)
-  double slope_sd_deg = 0.5;                               ///< >= 0
+  double slope_deg = 3;                                     ///< (0, 45)
+  double slope_sd_deg = 0.5;                                ///< >= 0
   RodStride launch{0.271028680, -1.09238359, -0.37737395};  ///< of every trial
-  double launch_spread = 0;                                ///< sd of each of its numbers, as a share of it, [0, 0.2]
-  std::array<double, 3> sensor_sd{0.0005, 0.005, 0.005};   ///< of half angle [rad], stance and swing rate [rad/s]
-  std::vector<Effect> effects = {};                        ///< of walker_effects(), each at most once
-  std::vector<OutsideEffect> outside = {};                 ///< of walker_outside_effects()
-  std::size_t trials = 50;                                 ///< >= 1
-  std::size_t longest = 1000;                              ///< steps of a walk, >= 1
+  double launch_spread = 0;                                 ///< sd of each of its numbers, as a share of it, [0, 0.2]
+  std::array<double, 3> sensor_sd{0.0005, 0.005, 0.005};    ///< of half angle [rad], stance and swing rate [rad/s]
+  std::vector<Effect> effects = {};                         ///< of walker_effects(), each at most once
+  std::vector<OutsideEffect> outside = {};                  ///< of walker_outside_effects()
+  std::size_t trials = 50;                                  ///< >= 1
+  std::size_t longest = 1000;                               ///< steps of a walk, >= 1
   std::uint64_t seed = 1;
 };
 

@@ -213,6 +213,24 @@ std::optional<double> strike_time(const Motion& m, std::size_t lane, double step
   return time;
 }
 
+/// The same where the swing leg is `ratio` times as long as the stance leg: its foot is over the ground by cos theta -
+/// ratio cos psi stance legs, and before the stance foot by ratio sin psi - sin theta.
+std::optional<double> strike_time(const Motion& m, std::size_t lane, double step, const Motion& end, double ratio) {
+  const auto height = [&](double theta, double psi) { return std::cos(theta) - ratio * std::cos(psi); };
+  const auto lead = [&](double theta, double psi) { return ratio * std::sin(psi) - std::sin(theta); };
+  const double theta = end.theta[0][lane], psi = end.psi[0][lane];
+  if (!(height(m.theta[0][lane], m.psi[0][lane]) > 0) || height(theta, psi) > 0 || !(lead(theta, psi) > 0))
+    return std::nullopt;
+  const auto over = [&](double t) { return height(at(m.theta, lane, t), at(m.psi, lane, t)); };
+  const auto rate = [&](double t) {
+    return ratio * std::sin(at(m.psi, lane, t)) * at(m.nu, lane, t) -
+           std::sin(at(m.theta, lane, t)) * at(m.omega, lane, t);
+  };
+  const double time = falling_root(0, step, over, rate);
+  if (!(lead(at(m.theta, lane, time), at(m.psi, lane, time)) > 0)) return std::nullopt;
+  return time;
+}
+
 /// Returns when within the step the legs' turning against each other changes its sign; nothing if it does not.
 std::optional<double> turning_back(const Motion& m, std::size_t lane, double step, const Motion& end) {
   const double before = m.omega[0][lane] - m.nu[0][lane], after = end.omega[0][lane] - end.nu[0][lane];
@@ -238,6 +256,7 @@ class Way {
     friction_[k] = {e.stance_friction, e.swing_friction};
     hip_ = hip_ || e.stance_damping != 0 || e.swing_damping != 0 || e.stance_friction != 0;
     taylor_step_[k / vector_width][k % vector_width] = course.taylor_step;
+    swing_ratio_[k] = course.swing_ratio;
     passed_[k] = 0;
     turns_back_[k] = false;
     start(now(k), k % vector_width, from, slope);
@@ -256,7 +275,10 @@ class Way {
     at_ = 1 - at_;
   }
   std::optional<LegMotion> struck(std::size_t lane) const {
-    const auto time = strike_time(now(lane), lane % vector_width, step_of(lane), next(lane));
+    const std::size_t in = lane % vector_width;
+    const auto time = swing_ratio_[lane] == 1
+                          ? strike_time(now(lane), in, step_of(lane), next(lane))
+                          : strike_time(now(lane), in, step_of(lane), next(lane), swing_ratio_[lane]);
     if (!time) return std::nullopt;
     return after(lane, *time);
   }
@@ -324,6 +346,7 @@ class Way {
   std::array<Equations, vectors> equations_{};
   std::array<std::pair<double, double>, width> friction_{};
   std::array<double, width> sign_{};
+  std::array<double, width> swing_ratio_{};
   std::array<bool, width> turns_back_{};  // at the moment that the series start from
   std::array<Lanes, vectors> steps_{}, taylor_step_{};
   std::array<double, width> passed_{};

@@ -28,10 +28,11 @@ struct LegEquations {
   double stance_friction = 0, swing_friction = 0;  ///< friction over A, over C [1/s^2]
 };
 
-/// Says how a step is followed. [s]
+/// Says how a step is followed; times in [s].
 struct LegCourse {
   double taylor_step = 0;
-  double longest = 0;  ///< a walker whose foot has not struck by then has fallen
+  double longest = 0;      ///< a walker whose foot has not struck by then has fallen
+  double swing_ratio = 1;  ///< length of the swing leg over that of the stance leg; no unit
 };
 
 inline constexpr std::size_t legs_at_once = 64;

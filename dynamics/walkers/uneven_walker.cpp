@@ -29,6 +29,20 @@ LegEquations equations_of(const UnevenWalker& w) {
           .swing_friction = w.hip_friction / swing_inertia};
 }
 
+// Returns the angle to the slope's normal by which legs of unequal length lean as both feet stand; 0 for equal ones.
+double lean(const UnevenWalker& w, double half) {
+  const double stance = w.stance.length(), swing = w.swing.length();
+  return std::atan((stance - swing) / (stance + swing) / std::tan(half));
+}
+
+// Returns half the angle between legs whose feet stand `slip` further apart than at `half`.
+double half_after(double one, double other, double half, double slip) {
+  if (slip == 0) return half;
+  const double squares = one * one + other * other, twice = 2 * one * other;
+  const double apart = std::sqrt(squares - twice * std::cos(2 * half)) + slip;
+  return 0.5 * std::acos(std::clamp((squares - apart * apart) / twice, -1.0, 1.0));
+}
+
 void strike(const UnevenWalker& w, const LegMotion& before, double* after) {
   const WalkerLeg &old = w.stance, &struck = w.swing;
   const double apart = std::cos(before.stance_angle - before.swing_angle), hip = w.hip_mass;
@@ -40,7 +54,7 @@ void strike(const UnevenWalker& w, const LegMotion& before, double* after) {
   const double inertia = hip * l * l + struck.mass * a * a + old.mass * l * l * (1 - apart * apart);
   const double kept = std::sqrt(1 - w.impact_loss), new_stance = momentum / inertia;
   const double half = 0.5 * (before.swing_angle - before.stance_angle);
-  after[0] = std::asin(std::min(1.0, std::sin(half) + w.foot_slip / (old.length() + l)));
+  after[0] = half_after(old.length(), l, half, w.foot_slip);
   after[1] = kept * new_stance;
   // About the hip.
   after[2] = kept * (l * apart * new_stance - old.foot_to_mass * stance) / old.mass_to_hip;
@@ -66,11 +80,13 @@ void step_uneven(std::span<const UnevenWalker> walkers, std::span<const double> 
       fell[i] = 1;
       const UnevenWalker& w = walkers[i];
       if (!walkable(&states[3 * i]) || !std::isfinite(slopes[i])) continue;
-      from[walking] = {0, states[3 * i], -states[3 * i], states[3 * i + 1], states[3 * i + 2]};
+      const double half = states[3 * i], leans = lean(w, half);
+      from[walking] = {0, leans + half, leans - half, states[3 * i + 1], states[3 * i + 2]};
       slope[walking] = slopes[i];
       equations[walking] = equations_of(w);
       courses[walking] = {taylor_share * std::sqrt(std::min(w.stance.length(), w.swing.mass_to_hip) / w.gravity),
-                          longest_share * std::sqrt(w.stance.length() / w.gravity)};
+                          longest_share * std::sqrt(w.stance.length() / w.gravity),
+                          w.swing.length() / w.stance.length()};
       which[walking++] = i;
     }
     if (walking == 0) continue;

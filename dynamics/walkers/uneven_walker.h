@@ -17,7 +17,7 @@ struct WalkerLeg {
   double length() const { return foot_to_mass + mass_to_hip; }
 };
 
-/// Holds a walker as it begins a step. Both legs have one length.
+/// Holds a walker as it begins a step.
 struct UnevenWalker {
   WalkerLeg stance, swing;
   double hip_mass = 10;     ///< [kg], >= 0
@@ -29,10 +29,10 @@ struct UnevenWalker {
 };
 
 /// Takes one step of each walker: state i, half the angle between the legs [rad], stance rate and swing rate [rad/s] as
-/// in Stride, stands at states[3 i], meets a plane of slopes[i] [rad] and leads to next[3 i], in which the legs have
-/// changed their parts; or fell[i] is 1, as of TwoLinkWalker::step, and where the half angle is not between 0 and pi/2.
-/// Strikes keep the angular momenta of the walker about the struck foot and of the new swing leg about the hip. A
-/// friction that would hold the legs still for a moment lets them pass.
+/// in Stride, stands at states[3 i] with both feet on the ground, meets a plane of slopes[i] [rad] and leads to next[3
+/// i], in which the legs have changed their parts; or fell[i] is 1, as of TwoLinkWalker::step, and where the half angle
+/// is not between 0 and pi/2. Strikes keep the angular momenta of the walker about the struck foot and of the new swing
+/// leg about the hip. A friction that would hold the legs still for a moment lets them pass.
 void step_uneven(std::span<const UnevenWalker> walkers, std::span<const double> states, std::span<const double> slopes,
                  std::span<double> next, std::span<std::uint8_t> fell);
 

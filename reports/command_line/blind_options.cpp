@@ -1,3 +1,6 @@
+#include <stdexcept>
+
+#include "analysis/experiment/suggestion.h"
 #include "reports/command_line/command.h"
 #include "reports/command_line/requests.h"
 #include "reports/experiment_commands/blind_command.h"
@@ -19,6 +22,7 @@ void declare_blind(Options& o) {
   o.add("many", "N", "0", "make: cases with three effects, 0..5000");
   o.add("law", "published|settled|both", "published",
         "make: law of the cases: published (first laboratory), settled (second one, a rigid body), both in turn");
+  o.add("walker", "compass", "", "make: cases of the compass gait, from the laboratory of walkers, not of the wheel");
   o.add("tool", "PROGRAM", "", "answer: run 'PROGRAM diagnose CASE --json FILE ...' (default: this program)");
   o.add_flag("partial", "open: although some cases are not answered");
   o.add_threads();
@@ -39,6 +43,11 @@ BlindRequest blind_request(const Options& o, const std::string& line) {
   request.size.left_out_per_effect = o.count("left-out", 0, 1000);
   request.size.mixed = o.count("mixed", 0, 5000);
   request.size.many = o.count("many", 0, 5000);
+  request.size.walkers = o.given("walker");
+  if (request.size.walkers) {
+    analysis::require_word("--walker", o.text("walker"), {"compass"});
+    if (o.text("law") != "published") throw std::invalid_argument("--law: has no meaning with --walker");
+  }
   if (o.text("law") == "both")
     request.size.laws = {dynamics::Law::published, dynamics::Law::settled};
   else

@@ -38,8 +38,8 @@ struct WalkerRequest {
   std::vector<double> slopes, slope_sds;                     ///< [deg], the axes of a sweep: settings slope by slope
   analysis::WalkOptions walks = {};                          ///< of simulate
   std::vector<std::pair<std::string, double>> effects = {};  ///< of simulate: "hip_damping.damping" and values
-  std::optional<analysis::WalkerReality> reality = {};       ///< of simulate, in the laboratory, with effects of its own
-  const struct Sharing* sharing = nullptr;                   ///< of a sweep, with other processes
+  std::optional<analysis::WalkerReality> reality = {};  ///< of simulate, in the laboratory, with effects of its own
+  const struct Sharing* sharing = nullptr;              ///< of a sweep, with other processes
 };
 
 /// Holds what `steps` and `compare` find; moments where they were asked for.
@@ -75,8 +75,8 @@ void run_walker_compare(const WalkerRequest& request);
 /// Writes expected steps over slopes and their sds; it is taken up again like every sweep.
 void run_walker_sweep(const WalkerRequest& request);
 
-/// Writes an experiment folder of walks (experiment.toml, steps.csv, trials.csv), of the model or of the laboratory; with terrain that remembers,
-/// walks.csv (every step, exact) and trials.csv.
+/// Writes an experiment folder of walks (experiment.toml, steps.csv, trials.csv), of the model or of the laboratory;
+/// with terrain that remembers, walks.csv (every step, exact) and trials.csv.
 void run_walker_simulate(const WalkerRequest& request);
 
 /// Writes the page of walkers: numbers, section, last steps.

@@ -29,7 +29,8 @@ std::string truth_json(const analysis::BlindTruth& truth, const std::string& sal
   j["case"] = truth.number;
   j["kind"] = std::string(analysis::blind_kind_name(truth.kind));
   j["law"] = std::string(dynamics::law_name(truth.law));
-  j["laboratory"] = truth.law == dynamics::Law::settled ? "second" : "first";
+  j["laboratory"] = truth.slope_deg ? "walkers" : truth.law == dynamics::Law::settled ? "second" : "first";
+  if (truth.slope_deg) j["slope_deg"] = spread(*truth.slope_deg);
   j["effects"] = ordered_json::array();
   for (const dynamics::Effect& effect : truth.effects)
     j["effects"].push_back({{"id", effect.id}, {"values", effect.values}, {"text", dynamics::effect_text(effect)}});
@@ -58,6 +59,7 @@ analysis::BlindTruth read_truth(const std::string& file, std::string_view text) 
     truth.number = j.at("case").get<int>();
     truth.kind = analysis::blind_kind(j.at("kind").get<std::string>());
     truth.law = dynamics::law_from_name(j.value("law", "published"));
+    if (j.contains("slope_deg")) truth.slope_deg = spread(j.at("slope_deg"));
     for (const ordered_json& effect : j.at("effects"))
       truth.effects.push_back({effect.at("id").get<std::string>(), effect.at("values").get<std::vector<double>>()});
     if (!j.at("outside").is_null())

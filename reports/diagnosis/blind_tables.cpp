@@ -143,6 +143,7 @@ std::string truth_text(const analysis::BlindTruth& truth) {
   for (const dynamics::Effect& effect : truth.effects)
     text += (text.empty() ? "" : " ") + dynamics::effect_text(effect);
   if (!text.empty()) return text;
+  if (truth.slope_deg) return truth.nominal_is_true ? "nominal slope" : "other slope";
   return truth.nominal_is_true ? "nominal contact" : "other contact";
 }
 
@@ -156,7 +157,7 @@ Table all_cases(const Truths& truths, const Answers& answers, const Provenance& 
       .provenance = provenance};
   for (std::size_t i = 0; i < truths.size(); ++i) {
     const analysis::BlindTruth& t = truths[i];
-    table.rows.push_back({t.number, std::string(dynamics::law_name(t.law)),
+    table.rows.push_back({t.number, t.slope_deg ? "compass" : std::string(dynamics::law_name(t.law)),
                           std::string(analysis::blind_kind_name(t.kind)), truth_text(t), t.strength, t.power, t.left,
                           answers[i] ? analysis::verdict_name(answers[i]->verdict) : "no answer",
                           answers[i] ? list(answers[i]->cause_set) : ""});

@@ -114,14 +114,18 @@ void write_case(const Places& places, const analysis::BlindCase& made, const std
   const fs::path folder = places.case_folder(number);
   make_folder(folder);
   write_file(places.truth(number), truth);
-  write_file(folder / "collisions.csv", made.files.files.collisions_csv);
-  if (!made.files.files.trials_csv.empty()) write_file(folder / "trials.csv", made.files.files.trials_csv);
+  const std::string& trials = made.walks ? made.walks->trials_csv : made.files.files.trials_csv;
+  if (made.walks)
+    write_file(folder / "steps.csv", made.walks->steps_csv);
+  else
+    write_file(folder / "collisions.csv", made.files.files.collisions_csv);
+  if (!trials.empty()) write_file(folder / "trials.csv", trials);
   if (!made.catalogue.empty()) {
     std::string ids;
     for (const std::string& id : made.catalogue) ids += (ids.empty() ? "" : ",") + id;
     write_file(folder / "catalogue.txt", ids + "\n");
   }
-  write_file(folder / "experiment.toml", made.files.files.experiment_toml);
+  write_file(folder / "experiment.toml", made.walks ? made.walks->experiment_toml : made.files.files.experiment_toml);
   write_file(folder / "seal.txt", sha256(truth) + "\n");  // last: without it there is no case
 }
 
@@ -175,7 +179,8 @@ std::string plan_text(const analysis::BlindSize& size, std::uint64_t seed) {
   std::string text =
       fmt::format("seed {}\neffect {}\nnone {}\npairs {}\noutside {}\nleft_out {}\n", seed,
                   size.per_effect_and_strength, size.none, size.pairs, size.outside, size.left_out_per_effect);
-  // Plans without these kinds, or of one law, are written as they were before there were any.
+  // Plans without these kinds, of one law or of wheels are written as they were before there were any.
+  if (size.walkers) text += "walker compass\n";
   if (size.mixed > 0) text += fmt::format("mixed {}\n", size.mixed);
   if (size.many > 0) text += fmt::format("many {}\n", size.many);
   if (size.laws != analysis::BlindSize{}.laws)
@@ -323,7 +328,11 @@ void complete_truths(const Places& places, std::vector<analysis::BlindTruth>& tr
   markov::parallel_for(truths.size(), threads, [&places, &truths](std::size_t i) {
     analysis::BlindTruth& truth = truths[i];
     if (truth.effects.size() < 2 && truth.kind != analysis::BlindKind::mixed) return;
-    analysis::complete_each(truth, analysis::read_experiment(places.case_folder(truth.number)));
+    const fs::path folder = places.case_folder(truth.number);
+    if (truth.slope_deg)
+      analysis::complete_each(truth, *analysis::read_walks(folder));
+    else
+      analysis::complete_each(truth, analysis::read_experiment(folder));
   });
 }
 

@@ -40,7 +40,7 @@ def _run(function, progress, label, folder, **options):
 
 
 def make(folder, *, sealed=None, seed=None, per_effect=6, none=300, pairs=50, outside=50, left_out=3, mixed=0, many=0,
-         law="published", threads=0, progress=None):
+         law="published", walker=None, threads=0, progress=None):
     """Draws cases in the virtual laboratory and seals their truths; a run cut short goes on. Returns Made.
 
     folder      of the run; sealed: of the truths (None: folder + "-sealed")
@@ -49,10 +49,11 @@ def make(folder, *, sealed=None, seed=None, per_effect=6, none=300, pairs=50, ou
                 outside: with an effect that no catalogue holds; left_out: of each effect, with a catalogue without it;
                 mixed: with one or two effects and one that no catalogue holds; many: with three effects
     law         "published" (first laboratory), "settled" (second one, a rigid body) or "both", in turn
+    walker      "compass": cases of the compass gait, from the laboratory of walkers; None: of the wheel
     """
     return Made(**_run(_metastable.blind_make, progress, "make", folder, sealed=sealed, seed=seed,
                        per_effect=per_effect, none=none, pairs=pairs, outside=outside, left_out=left_out,
-                       mixed=mixed, many=many, law=law, threads=threads))
+                       mixed=mixed, many=many, law=law, walker=walker, threads=threads))
 
 
 def answer(folder, *, tool=None, threads=0, progress=None):

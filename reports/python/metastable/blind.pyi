@@ -25,7 +25,8 @@ class Grades(Description): ...
 
 def make(folder: Path, *, sealed: Optional[Path] = None, seed: Optional[int] = None, per_effect: int = 6,
          none: int = 300, pairs: int = 50, outside: int = 50, left_out: int = 3, mixed: int = 0, many: int = 0,
-         law: str = "published", threads: int = 0, progress: Progress = None) -> Made: ...
+         law: str = "published", walker: Optional[str] = None, threads: int = 0,
+         progress: Progress = None) -> Made: ...
 
 
 def answer(folder: Path, *, tool: Union[None, str, Sequence[str]] = None, threads: int = 0,

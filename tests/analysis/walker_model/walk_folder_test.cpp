@@ -10,6 +10,7 @@
 #include <string>
 
 #include "analysis/experiment/input_error.h"
+#include "analysis/walker_model/walker_experiment.h"
 #include "tests/message_of.h"
 #include "tests/own_folder.h"
 
@@ -113,6 +114,46 @@ TEST_F(WalkFolder, UnknownEffectsOfACatalogueHintAtTheNearest) {
   const std::string message = message_of<std::invalid_argument>([&] { diagnose_walks(*read_walks(folder_), options); });
   EXPECT_NE(message.find("catalogue: 'leg_mas' is none of hip_damping"), std::string::npos) << message;
   EXPECT_NE(message.find("did you mean 'leg_mass'"), std::string::npos) << message;
+}
+
+TEST_F(WalkFolder, HasTheSameBytesOnAnyNumberOfThreads) {
+  WalkerSetting setting{Walker::compass, 3, 0.3, dynamics::Terrain::fresh};
+  WalkOptions one, four;
+  one.trials = four.trials = 9;
+  one.longest = four.longest = 6;
+  one.threads = 1;
+  four.threads = 4;
+  const std::vector<std::pair<std::string, double>> effects{{"leg_length.longer", 0.01}};
+  EXPECT_EQ(draw_walks(setting, effects, one, "").steps_csv, draw_walks(setting, effects, four, "").steps_csv);
+  const auto laboratory = walker_laboratory(setting, {}, one);
+  EXPECT_EQ(laboratory_walks(laboratory, run_walks(laboratory, one), {}, {}).steps_csv,
+            laboratory_walks(laboratory, run_walks(laboratory, four), {}, {}).steps_csv);
+}
+
+TEST_F(WalkFolder, TheLaboratorysWalksAreReadWithWhatIsTold) {
+  WalkStatement statement{"laboratory", {}, {}};
+  WalkOptions options;
+  options.trials = 4;
+  options.longest = 8;
+  const auto laboratory = walker_laboratory(statement.walker.setting, {}, options);
+  const auto trials = run_walks(laboratory, options);
+  write(laboratory_walks(laboratory, trials, statement, {}));
+  const Walks all = *read_walks(folder_);
+  EXPECT_TRUE(all.runs.timed());
+  EXPECT_TRUE(all.runs.placed());
+  EXPECT_EQ(all.machine->inputs, std::vector<std::string>{"stance_leg"});
+  ASSERT_EQ(all.runs.trials.size(), 4u);
+  EXPECT_EQ(all.runs.trials[1].rows.size(), trials[1].rows.size());
+  EXPECT_NEAR(all.runs.trials[1].rows[2].seen[0], trials[1].rows[2].seen.half_angle, 1e-8);
+  write(laboratory_walks(laboratory, trials, statement, {"phase", "time_s", "position_m"}));
+  const Walks less = *read_walks(folder_);
+  EXPECT_FALSE(less.runs.timed());
+  EXPECT_FALSE(less.runs.placed());
+  EXPECT_TRUE(less.machine->inputs.empty());
+  EXPECT_NE(message_of<std::invalid_argument>([&] {
+              laboratory_walks(laboratory, trials, statement, {"leg"});
+            }).find("--drop: 'leg' is none of phase, time_s, position_m, outcome"),
+            std::string::npos);
 }
 
 // One leg has more mass: the diagnosis names it with its size.

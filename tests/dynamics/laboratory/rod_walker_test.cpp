@@ -98,6 +98,20 @@ TEST(RodWalker, StepsAsTheModelDoesOnLegsThatDiffer) {
   expect_agreement(model, real, 1e-8, 1);
 }
 
+TEST(RodWalker, StepsAsTheModelDoesOnLegsOfUnequalLength) {
+  for (const double longer : {0.02, -0.03}) {
+    RodWalkerOptions real;
+    real.legs[0].foot_to_mass += longer;
+    real.foot_slip = 0.01;
+    UnevenWalker model;
+    model.stance.foot_to_mass += longer;
+    model.foot_slip = 0.01;
+    expect_agreement(model, real, 1e-8, 0);
+    std::swap(model.stance, model.swing);
+    expect_agreement(model, real, 1e-8, 1);
+  }
+}
+
 TEST(RodWalker, KeepsTheEnergyBetweenStrikes) {
   RodWalker walker({}, 0, gait);
   const double before = walker.energy(slope);

@@ -177,14 +177,19 @@ TEST(WalkerLaboratory, RefusesWhatItDoesNotHave) {
     return message_of([&] { WalkerLaboratory{setup}; });
   };
   EXPECT_EQ(refused([](auto& s) { s.slope_deg = 50; }), "laboratory: slope: 50 is outside (0, 45) deg");
-  EXPECT_EQ(refused([](auto& s) { s.effects = {{"hip_damping", {9}}}; }),
+  EXPECT_EQ(refused([](auto& s) {
+              s.effects = {{"hip_damping", {9}}};
+            }),
             "effect hip_damping: damping: 9 N m s/rad is outside [0, 5]");
-  EXPECT_NE(refused([](auto& s) { s.effects = {{"leg_contact", {1}}}; }).find("is none of hip_damping"),
+  EXPECT_NE(refused([](auto& s) {
+              s.effects = {{"leg_contact", {1}}};
+            }).find("is none of hip_damping"),
             std::string::npos);
-  EXPECT_EQ(refused([](auto& s) { s.effects = {{"outliers", {0.1}}, {"outliers", {0.1}}}; }),
+  EXPECT_EQ(refused([](auto& s) {
+              s.effects = {{"outliers", {0.1}}, {"outliers", {0.1}}};
+            }),
             "effect outliers: given twice");
-  EXPECT_EQ(refused([](auto& s) { s.outside = {{"round_feet", 3}}; }),
-            "effect round_feet: size 3 is outside [0, 0.2]");
+  EXPECT_EQ(refused([](auto& s) { s.outside = {{"round_feet", 3}}; }), "effect round_feet: size 3 is outside [0, 0.2]");
   EXPECT_NE(refused([](auto& s) { s.outside = {{"planks", 0.1}}; }).find("is none of round_feet"), std::string::npos);
 }
 

@@ -75,6 +75,35 @@ TEST_F(WalkerCommand, SimulateWritesEveryStep) {
       << wrong.err;
 }
 
+TEST_F(WalkerCommand, SimulateWalksInTheLaboratory) {
+  const auto real = [&](std::vector<std::string> more) {
+    std::vector<std::string> words{"simulate", "--walker", "compass",      "--slope-sd", "0.3",   "--reality",
+                                   "--trials", "3",        "--collisions", "5",          "--out", path("real")};
+    words.insert(words.end(), more.begin(), more.end());
+    return words;
+  };
+  for (const auto& [more, told] : std::vector<std::pair<std::vector<std::string>, std::string>>{
+           {{"--effect", "hip_dampin:damping=0.1"}, "did you mean 'hip_damping'?"},
+           {{"--effect", "hip_damping:damping=99"}, "effect hip_damping: damping: 99 N m s/rad is outside [0, 5]"},
+           {{"--outside", "planks:0.1"}, "outside effect: \"planks\" is none of round_feet"},
+           {{"--outside", "round_feet:0.5"}, "effect round_feet: size 0.5 is outside [0, 0.2]"},
+           {{"--outside", "round_feet"}, "--outside: 'round_feet' is not of the form ID:SIZE"},
+           {{"--drop", "leg"}, "--drop: 'leg' is none of phase, time_s, position_m, outcome"},
+           {{"--skewness", "1"}, "--skewness: has no meaning with --walker"},
+           {{"--terrain", "facets"}, "--terrain: the laboratory has a plane that tilts anew"}}) {
+    const Ran wrong = metastable(real(more));
+    EXPECT_EQ(wrong.code, 2) << told;
+    EXPECT_NE(wrong.err.find(told), std::string::npos) << wrong.err;
+    EXPECT_FALSE(std::filesystem::exists(path("real")));
+  }
+  const Ran simplest = metastable(walker("simulate", {"--reality", "--out", path("real")}));
+  EXPECT_NE(simplest.err.find("--reality: the laboratory has no walker simplest; it has the compass"),
+            std::string::npos);
+  const Ran ran = metastable(real({"--outside", "round_feet:0.02", "--effect", "leg_length:longer=0.01"}));
+  ASSERT_EQ(ran.code, 0) << ran.err;
+  EXPECT_EQ(read(path("real/steps.csv")).find("trial,step,phase,time_s,position_m,half_angle_rad,"), 0u);
+}
+
 TEST_F(WalkerCommand, SweepIsTakenUpAgain) {
   const std::vector<std::string> words =
       walker("sweep", {"--slope", "0.5", "--spacing", "1", "--simulated-steps", "20000", "--out", path("s.csv")});

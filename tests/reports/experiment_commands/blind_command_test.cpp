@@ -6,6 +6,7 @@
 #include <string>
 
 #include "analysis/experiment/experiment.h"
+#include "analysis/walker_model/walk_folder.h"
 #include "reports/diagnosis/blind_json.h"
 #include "reports/diagnosis/blind_tables.h"
 #include "reports/output/file_lock.h"
@@ -75,6 +76,23 @@ TEST_F(BlindRun, MakesAnswersAndOpens) {
     for (const char* form : {".csv", ".md", ".tex"})
       EXPECT_TRUE(fs::exists(report / "tables" / (std::string(id) + form))) << id << form;
   EXPECT_FALSE(fs::exists(report / "figures"));
+}
+
+TEST_F(BlindRun, MakesAndOpensCasesOfWalkers) {
+  request_.size = {.per_effect_and_strength = 0, .none = 1, .pairs = 0, .outside = 0, .left_out_per_effect = 0};
+  request_.size.walkers = true;
+  run_blind_make(request_);
+  const fs::path one = fs::path(request_.folder) / "cases" / "0001";
+  EXPECT_FALSE(fs::exists(one / "collisions.csv"));
+  EXPECT_GE(analysis::read_walks(one)->runs.trials.size(), 60u);
+  BlindRequest wheels = request_;
+  wheels.size.walkers = false;
+  EXPECT_NE(message_of([&] { run_blind_make(wheels); }).find("belongs to a run of another seed or size"),
+            std::string::npos);
+  run_blind_answer(request_);
+  run_blind_open(request_);
+  const std::string cases = read(fs::path(request_.folder) / "report" / "tables" / "blind-cases.csv");
+  EXPECT_NE(cases.find("1,compass,none,"), std::string::npos) << cases;
 }
 
 TEST_F(BlindRun, RefusesASealedFolderThatIsNoCase) {
