@@ -7,7 +7,7 @@
 #include <cmath>
 #include <memory>
 #include <set>
-#include <stdexcept>
+#include <utility>
 
 #include "analysis/blind/blind_dice.h"
 #include "analysis/blind/effect_power.h"
@@ -20,7 +20,8 @@
 namespace metastable::analysis {
 namespace {
 
-constexpr int replicates = 2;  // of the walks by which a power is measured
+constexpr int replicates = 2;               // of the walks by which a power is measured
+constexpr std::size_t weighed_trials = 24;  // on which an outside effect is sized: fits take their time
 
 // Describes an experiment in the laboratory, with what its folder tells.
 struct WalkDesign {
@@ -89,8 +90,8 @@ WalkDesign draw_walk_design(BlindTruth& truth, const std::set<std::string>& need
   truth.slope_deg =
       Spread{std::round(100 * dice.uniform(2.7, 3.3)) / 100, std::round(1000 * dice.uniform(0.3, 0.46)) / 1000};
   design.truth = {Walker::compass, truth.slope_deg->mean, truth.slope_deg->sd, dynamics::Terrain::fresh};
-  design.options.trials = static_cast<std::size_t>(dice.whole(60, 100));
-  design.options.longest = static_cast<std::uint64_t>(dice.whole(15, 24));
+  design.options.trials = static_cast<std::size_t>(dice.whole(60, 80));
+  design.options.longest = static_cast<std::uint64_t>(dice.whole(15, 20));
   design.options.seed = truth.seed;
   design.options.threads = 1;
   design.reality.launch_spread = dice.uniform(0, 0.03);
@@ -116,21 +117,28 @@ WalkStatement draw_walk_statement(const BlindPlan& plan, BlindTruth& truth, Blin
   return statement;
 }
 
-// Returns 2 log(likelihood of the walks without the design's outside effect / with it), each under a model recalibrated
-// to them. Both have the same scores and errors of sensors, so that this is what the effect moves them by.
-double outside_walk_power(WalkDesign design, const dynamics::OutsideEffect& effect) {
-  const auto likelihood = [&] {
+// Weighs an outside effect: 2 log(likelihood of the walks without it / with it), each under a model recalibrated to
+// them. Both have the same scores and errors of sensors, so that this is what the effect moves them by.
+class OutsideScales {
+ public:
+  explicit OutsideScales(WalkDesign design) : design_(std::move(design)), without_(likelihood()) {}
+  double power(const dynamics::OutsideEffect& effect) {
+    design_.reality.outside = {effect};
+    return 2 * (without_ - likelihood());
+  }
+
+ private:
+  double likelihood() const {
     WalkStatement statement{"power", {}, {}};
-    statement.walker.setting = design.truth;
-    const auto walks = parse_walks(source_of(files_of(design, statement), "laboratory"));
+    statement.walker.setting = design_.truth;
+    const auto walks = parse_walks(source_of(files_of(design_, statement), "laboratory"));
     const auto model = machine_transitions(walks->machine, walks->runs);
     return fit(*model, nominal_values(*model), {}).log_likelihood;
-  };
-  design.reality.outside.clear();
-  const double without = likelihood();
-  design.reality.outside = {effect};
-  return 2 * (without - likelihood());
-}
+  }
+
+  WalkDesign design_;
+  double without_;
+};
 
 // Sizes the effect that no catalogue holds and adds it to the design and the truth.
 // @param target  power of each of the catalogue's effects
@@ -138,9 +146,14 @@ void size_walker_outside(const BlindPlan& plan, double target, BlindDice& dice, 
   const double largest = dynamics::walker_outside_info(plan.outside).upper;
   // Beside effects of the catalogue it is half as strong to twice as strong as each of them.
   const double of_outside = plan.effects.empty() ? target : target * std::exp2(dice.uniform(-1, 1));
-  const auto power = [&](double size) { return outside_walk_power(design, {plan.outside, size}); };
-  truth.outside = {plan.outside, find_size(0.02 * largest, largest, of_outside, power)};
-  const double own = power(truth.outside->size);
+  // The size is found on a share of the trials.
+  WalkDesign some = design;
+  some.options.trials = std::min(some.options.trials, weighed_trials);
+  const double share = static_cast<double>(some.options.trials) / static_cast<double>(design.options.trials);
+  OutsideScales scales(some);
+  const auto power = [&](double size) { return scales.power({plan.outside, size}); };
+  truth.outside = {plan.outside, find_size(0.01 * largest, largest, share * of_outside, power)};
+  const double own = OutsideScales(design).power(*truth.outside);
   truth.power += own;
   if (plan.effects.empty()) truth.left = own;
   design.reality.outside = {*truth.outside};
