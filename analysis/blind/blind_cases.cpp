@@ -258,10 +258,15 @@ std::vector<BlindPlan> blind_plan(const BlindSize& size, std::uint64_t seed) {
     return one.effects;
   };
   for (int p = 0; p < size.pairs; ++p) add({BlindKind::pair, several(2), 2});
-  const auto& outside = catalogue.outside;
-  const auto family = [&](int n) { return outside[static_cast<std::size_t>(n) % outside.size()].id; };
+  const auto family = [&](int n) {
+    return catalogue.outside[static_cast<std::size_t>(n) % catalogue.outside.size()].id;
+  };
   for (int o = 0; o < size.outside; ++o)
-    add({BlindKind::outside, {}, static_cast<std::size_t>(o) / outside.size() % 2 == 0 ? 2 : 4, {}, family(o)});
+    add({BlindKind::outside,
+         {},
+         static_cast<std::size_t>(o) / catalogue.outside.size() % 2 == 0 ? 2 : 4,
+         {},
+         family(o)});
   for (int m = 0; m < size.mixed; ++m)
     add({BlindKind::mixed, several(m % 2 == 0 ? 1 : 2, family(m)), 2, {}, family(m)});
   for (int m = 0; m < size.many; ++m) add({BlindKind::many, several(3), 2});

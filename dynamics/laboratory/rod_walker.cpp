@@ -137,10 +137,13 @@ double RodWalker::rate(const State& s, int leg) const {
 }
 
 // Returns how high the swing foot is over the ground.
-double RodWalker::height(const State& s) const {
+double RodWalker::height(const State& s) const { return height_of(s, 0) - options_.foot_radius; }
+
+// Returns that of the swing foot's arc's centre, from the positions at 0, or its rate, from the velocities at 8.
+double RodWalker::height_of(const State& s, std::size_t at) const {
   const auto i = static_cast<std::size_t>(1 - stance_);
   const double share = (options_.legs[i].length() - options_.foot_radius) / options_.legs[i].mass_to_hip;
-  return s[1] + share * (s[3 + 2 * i] - s[1]) - options_.foot_radius;
+  return s[at + 1] + share * (s[at + 3 + 2 * i] - s[at + 1]);
 }
 
 // Returns how much further down the slope the swing foot is than the standing one.
@@ -234,9 +237,18 @@ double RodWalker::next_piece(double longest, State& end) {
 // the line from foot to foot is followed: where legs of one length pass each other it goes on smoothly.
 std::optional<double> RodWalker::landing(double passed, const State& end) const {
   const auto slope = [this](const State& s) { return height(s) / lead(s); };
-  const double before = slope(state_), after = slope(end);
-  if (!(before > 0 && after <= 0)) return std::nullopt;
-  const double time = crossing([&](double t) { return slope(moved(t)); }, passed, before, after);
+  double from = 0, before = slope(state_);
+  const double after = slope(end);
+  if (!(after <= 0)) return std::nullopt;
+  if (!(before > 0)) {
+    // A foot before the standing one may have risen over the ground and come down within the piece.
+    const auto rise = [this](const State& s) { return height_of(s, 8); };
+    if (!(lead(state_) > 0 && lead(end) > 0 && rise(state_) > 0 && rise(end) < 0)) return std::nullopt;
+    from = crossing([&](double t) { return rise(moved(t)); }, passed, rise(state_), rise(end));
+    before = slope(moved(from));
+    if (!(before > 0)) return std::nullopt;
+  }
+  const double time = from + crossing([&](double t) { return slope(moved(from + t)); }, passed - from, before, after);
   const State at = moved(time);
   if (!(lead(at) > 0 && std::abs(height(at)) < ground)) return std::nullopt;
   return time;

@@ -88,6 +88,7 @@ class RodWalker {
   double rate(const State& s, int leg) const;
   double turning(const State& s) const { return rate(s, stance_) - rate(s, 1 - stance_); }
   double height(const State& s) const;
+  double height_of(const State& s, std::size_t at) const;
   double lead(const State& s) const;
   std::array<double, 8> forces(const State& s, double time) const;
   void derivative(const State& s, State& ds, double time) const;

@@ -216,18 +216,26 @@ std::optional<double> strike_time(const Motion& m, std::size_t lane, double step
 /// The same where the swing leg is `ratio` times as long as the stance leg: its foot is over the ground by cos theta -
 /// ratio cos psi stance legs, and before the stance foot by ratio sin psi - sin theta.
 std::optional<double> strike_time(const Motion& m, std::size_t lane, double step, const Motion& end, double ratio) {
-  const auto height = [&](double theta, double psi) { return std::cos(theta) - ratio * std::cos(psi); };
-  const auto lead = [&](double theta, double psi) { return ratio * std::sin(psi) - std::sin(theta); };
-  const double theta = end.theta[0][lane], psi = end.psi[0][lane];
-  if (!(height(m.theta[0][lane], m.psi[0][lane]) > 0) || height(theta, psi) > 0 || !(lead(theta, psi) > 0))
-    return std::nullopt;
-  const auto over = [&](double t) { return height(at(m.theta, lane, t), at(m.psi, lane, t)); };
+  const auto over = [&](double t) { return std::cos(at(m.theta, lane, t)) - ratio * std::cos(at(m.psi, lane, t)); };
   const auto rate = [&](double t) {
     return ratio * std::sin(at(m.psi, lane, t)) * at(m.nu, lane, t) -
            std::sin(at(m.theta, lane, t)) * at(m.omega, lane, t);
   };
-  const double time = falling_root(0, step, over, rate);
-  if (!(lead(at(m.theta, lane, time), at(m.psi, lane, time)) > 0)) return std::nullopt;
+  if (std::cos(end.theta[0][lane]) - ratio * std::cos(end.psi[0][lane]) > 0) return std::nullopt;
+  double low = 0;
+  if (!(over(0) > 0)) {
+    // The foot may have risen and come down within the step; it is highest where halved intervals of the rate lead.
+    if (!(rate(0) > 0 && rate(step) < 0)) return std::nullopt;
+    double high = step;
+    for (int halving = 0; halving < 50; ++halving) {
+      const double middle = 0.5 * (low + high);
+      (rate(middle) > 0 ? low : high) = middle;
+    }
+    if (!(over(low) > 0)) return std::nullopt;
+  }
+  const double time = falling_root(low, step, over, rate);
+  const double theta = at(m.theta, lane, time);
+  if (!(ratio * std::sin(at(m.psi, lane, time)) > std::sin(theta) && std::cos(theta) > 0)) return std::nullopt;
   return time;
 }
 
