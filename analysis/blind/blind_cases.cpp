@@ -206,6 +206,27 @@ void require_size(const BlindSize& size) {
       throw std::invalid_argument(fmt::format("laws: \"{}\" is none of published, settled", dynamics::law_name(law)));
 }
 
+bool had_under(const BlindPlan& one, dynamics::Law law) {
+  return (one.outside.empty() || can_be_had(one.outside, law)) &&
+         std::ranges::all_of(one.effects, [&](const std::string& id) { return can_be_had(id, law); });
+}
+
+// Lists the effects that cases of several draw from. One without a size is there or not: it cannot be made as visible
+// as another one beside it.
+std::vector<std::string> paired_effects(const CaseCatalogue& catalogue, const std::vector<dynamics::Law>& laws) {
+  std::vector<std::string> ids;
+  for (const dynamics::EffectInfo& info : catalogue.effects)
+    if (!is_recalibration(info.id) && !info.parameters.empty() &&
+        std::ranges::any_of(laws, [&](dynamics::Law law) { return can_be_had(info.id, law); }))
+      ids.push_back(info.id);
+  return ids;
+}
+
+void shuffle(std::vector<BlindPlan>& plan, BlindDice& dice) {
+  for (std::size_t i = plan.size(); i > 1; --i)
+    std::swap(plan[i - 1], plan[static_cast<std::size_t>(dice.whole(0, static_cast<int>(i) - 1))]);
+}
+
 }  // namespace
 
 std::vector<BlindPlan> blind_plan(const BlindSize& size, std::uint64_t seed) {
@@ -213,17 +234,13 @@ std::vector<BlindPlan> blind_plan(const BlindSize& size, std::uint64_t seed) {
   BlindDice dice(seed, 0);
   std::vector<BlindPlan> plan;
   std::map<BlindKind, std::size_t> turn;
-  const auto had = [](const BlindPlan& one, dynamics::Law law) {
-    return (one.outside.empty() || can_be_had(one.outside, law)) &&
-           std::ranges::all_of(one.effects, [&](const std::string& id) { return can_be_had(id, law); });
-  };
   const auto law_of = [&](const BlindPlan& one) {
-    return std::ranges::find_if(size.laws, [&](dynamics::Law law) { return had(one, law); });
+    return std::ranges::find_if(size.laws, [&](dynamics::Law law) { return had_under(one, law); });
   };
   const auto add = [&](BlindPlan one) {
     one.law = size.laws[turn[one.kind] % size.laws.size()];
     one.walker = size.walkers;
-    if (had(one, one.law)) {
+    if (had_under(one, one.law)) {
       ++turn[one.kind];
     } else {
       const auto other = law_of(one);
@@ -233,17 +250,14 @@ std::vector<BlindPlan> blind_plan(const BlindSize& size, std::uint64_t seed) {
     plan.push_back(std::move(one));
   };
   for (int n = 0; n < size.none; ++n) add({BlindKind::none, {}, 0});
-  std::vector<std::string> paired;
   const CaseCatalogue catalogue = catalogue_of(size);
+  const std::vector<std::string> paired = paired_effects(catalogue, size.laws);
   for (const dynamics::EffectInfo& info : catalogue.effects) {
     for (const int strength : {1, 2, 4})
       for (int n = 0; n < size.per_effect_and_strength; ++n) add({BlindKind::effect, {info.id}, strength});
     // It is the nuisances of every model, which recalibration removes: no candidate to be left out or paired.
     if (is_recalibration(info.id)) continue;
     for (int n = 0; n < size.left_out_per_effect; ++n) add({BlindKind::left_out, {info.id}, 2});
-    // An effect without a size is there or not: it cannot be made as visible as another one beside it.
-    if (!info.parameters.empty() && law_of({BlindKind::pair, {info.id}, 2}) != size.laws.end())
-      paired.push_back(info.id);
   }
   // Draws effects that one law has together.
   const auto several = [&](std::size_t count, const std::string& beside = "") {
@@ -270,8 +284,7 @@ std::vector<BlindPlan> blind_plan(const BlindSize& size, std::uint64_t seed) {
   for (int m = 0; m < size.mixed; ++m)
     add({BlindKind::mixed, several(m % 2 == 0 ? 1 : 2, family(m)), 2, {}, family(m)});
   for (int m = 0; m < size.many; ++m) add({BlindKind::many, several(3), 2});
-  for (std::size_t i = plan.size(); i > 1; --i)
-    std::swap(plan[i - 1], plan[static_cast<std::size_t>(dice.whole(0, static_cast<int>(i) - 1))]);
+  shuffle(plan, dice);
   return plan;
 }
 

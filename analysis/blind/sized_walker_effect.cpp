@@ -75,7 +75,7 @@ const std::map<std::string, WalkerEntry>& walker_entries() {
       {"foot_slip", {[](const D& d) { return one_way(d, 1e-4, 0.05); }, anywhere}},
       {"leg_mass", {mass_of_leg, {"leg", ":memory"}}},
       {"leg_length", {[](const D& d) { return two_ways(d, 1e-4, 0.04, {"phase"}); }, {"leg", ":memory"}}},
-      {"slope_offset", {[](const D& d) { return two_ways(d, 0.03, 0.6); }, anywhere}},
+      {"slope_deg_offset", {[](const D& d) { return two_ways(d, 0.03, 0.6); }, anywhere}},
       {"slope_deg_by_phase", {[](const D& d) { return two_ways(d, 0.04, 1, {"phase"}); }, {"leg", ":memory"}}},
       {"slope_deg_drift", {[](const D& d) { return two_ways(d, 0.1, 1.2); }, {"trial"}}},
       {"slope_deg_spread", {[](const D& d) { return one_way(d, 0.05, 0.6); }, {"trial", ":memory"}}},

@@ -20,6 +20,19 @@ EffectParameter sized(std::string name, std::string unit, double lower, double u
           .meaning = std::move(meaning)};
 }
 
+void add_sensors(std::vector<EffectInfo>& all) {
+  for (const auto& [state, unit, most] : {std::tuple("half_angle_rad", "rad", 0.02),
+                                          {"stance_rate_rad_s", "rad/s", 0.2},
+                                          {"swing_rate_rad_s", "rad/s", 0.2}}) {
+    all.push_back({fmt::format("sensor_noise_{}", state),
+                   fmt::format("the sensor of {} is noisier than stated", state),
+                   {sized("sd", unit, 0, most, "of an error beside the stated one")}});
+    all.push_back({fmt::format("sensor_bias_{}", state),
+                   fmt::format("the sensor of {} is off", state),
+                   {sized("bias", unit, -most, most, "added to every value")}});
+  }
+}
+
 std::vector<EffectInfo> make_effects() {
   std::vector<EffectInfo> all{
       {"hip_damping",
@@ -41,7 +54,7 @@ std::vector<EffectInfo> make_effects() {
       {"leg_length",
        "leg 1 is longer than stated",
        {sized("longer", "m", -0.05, 0.05, "by which it reaches further below its mass")}},
-      {"slope_offset",
+      {"slope_deg_offset",
        "the mean slope differs from the stated one",
        {sized("offset_deg", "deg", -2, 2, "added to it")}},
       {"slope_deg_by_phase",
@@ -70,16 +83,7 @@ std::vector<EffectInfo> make_effects() {
        "some steps meet a slope from a spread four times as wide",
        {sized("share", "", 0, 0.2, "of the steps")}},
   };
-  for (const auto& [state, unit, most] : {std::tuple("half_angle_rad", "rad", 0.02),
-                                          {"stance_rate_rad_s", "rad/s", 0.2},
-                                          {"swing_rate_rad_s", "rad/s", 0.2}}) {
-    all.push_back({fmt::format("sensor_noise_{}", state),
-                   fmt::format("the sensor of {} is noisier than stated", state),
-                   {sized("sd", unit, 0, most, "of an error beside the stated one")}});
-    all.push_back({fmt::format("sensor_bias_{}", state),
-                   fmt::format("the sensor of {} is off", state),
-                   {sized("bias", unit, -most, most, "added to every value")}});
-  }
+  add_sensors(all);
   return all;
 }
 

@@ -100,7 +100,7 @@ WalkerLaboratory::WalkerLaboratory(WalkerLaboratorySetup setup) : setup_(std::mo
          leg = {leg.mass * v[0], leg.foot_to_mass + v[1], leg.mass_to_hip - v[1]};
        }},
       {"leg_length", [&](Values v) { walker_.legs[0].foot_to_mass += v[0]; }},
-      {"slope_offset", [&](Values v) { terrain_.offset = v[0]; }},
+      {"slope_deg_offset", [&](Values v) { terrain_.offset = v[0]; }},
       {"slope_deg_by_phase", [&](Values v) { terrain_.by_phase = v[0]; }},
       {"slope_deg_drift", [&](Values v) { terrain_.drift = v[0]; }},
       {"slope_deg_spread", [&](Values v) { terrain_.spread = v[0]; }},

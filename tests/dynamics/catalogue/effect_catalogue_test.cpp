@@ -5,6 +5,7 @@
 #include <set>
 #include <stdexcept>
 
+#include "dynamics/catalogue/walker_effects.h"
 #include "dynamics/wheel/wheel.h"
 #include "tests/message_of.h"
 
@@ -33,6 +34,19 @@ TEST(EffectCatalogue, HoldsTwentyFourEffectsWithNeutralValuesInRange) {
     EXPECT_EQ(effect_from_text(effect_text(neutral), nominal).values, neutral.values) << effect_text(neutral);
   }
   EXPECT_EQ(ids.size(), 24U);
+}
+
+TEST(EffectCatalogue, WalkersEffectsHaveIdsOfTheirOwnAndNeutralValuesInRange) {
+  std::set<std::string> ids;
+  for (const EffectInfo& info : effect_catalogue()) ids.insert(info.id);
+  for (const EffectInfo& info : walker_effects()) {
+    EXPECT_TRUE(ids.insert(info.id).second) << info.id;
+    const Effect neutral = effect_from_values(info, {}, {});
+    EXPECT_EQ(neutral.values.size(), info.parameters.size()) << info.id;
+    EXPECT_EQ(effect_from_text(effect_text(neutral), {}, walker_effect_info).values, neutral.values) << info.id;
+  }
+  EXPECT_EQ(message_of([] { effect_from_text("leg_length:longer=1", {}, walker_effect_info); }),
+            "effect leg_length: longer: 1 m is outside [-0.05, 0.05]");
 }
 
 TEST(EffectCatalogue, WhatIsNotNamedIsNeutralOrAsStated) {

@@ -65,7 +65,7 @@ Agreement agreement(const UnevenWalker& model, const RodWalkerOptions& real, int
 
 void expect_agreement(const UnevenWalker& model, const RodWalkerOptions& real, double tolerance, int stance = 0) {
   const Agreement found = agreement(model, real, stance);
-  EXPECT_GT(found.walked, 40);
+  EXPECT_GT(found.walked, 25);
   EXPECT_EQ(found.torn, 0);
   EXPECT_LT(found.worst, tolerance);
 }

@@ -83,7 +83,7 @@ TEST(WalkerLaboratory, SlopesShowTheEffectsOfTheGround) {
     for (std::size_t i = 0; i < with.size(); ++i)
       EXPECT_NEAR(with[i].slope - plain[i].slope, expected(with[i]), 1e-6) << effect << " " << i;
   };
-  differences("slope_offset:offset_deg=0.2", [](const Met&) { return 0.2; });
+  differences("slope_deg_offset:offset_deg=0.2", [](const Met&) { return 0.2; });
   differences("slope_deg_by_phase:change_in_1=0.2", [](const Met& m) { return m.row.leg == 1 ? 0.2 : 0; });
   differences("slope_deg_drift:change_over_the_runs=0.4",
               [](const Met& m) { return 0.4 * (static_cast<double>(m.trial) / 19 - 0.5); });
