@@ -17,8 +17,8 @@
 #include "analysis/blind/sized_effect.h"
 #include "analysis/blind/walker_cases.h"
 #include "analysis/experiment/stand_in.h"
+#include "analysis/walker_model/walker_experiment.h"
 #include "dynamics/catalogue/walker_effects.h"
-#include "dynamics/laboratory/walker_laboratory.h"
 
 namespace metastable::analysis {
 namespace {

@@ -3,9 +3,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <array>
 #include <cmath>
-#include <memory>
 #include <set>
 #include <utility>
 
@@ -118,26 +116,44 @@ WalkStatement draw_walk_statement(const BlindPlan& plan, BlindTruth& truth, Blin
 }
 
 // Weighs an outside effect: 2 log(likelihood of the walks without it / with it), each under a model recalibrated to
-// them. Both have the same scores and errors of sensors, so that this is what the effect moves them by.
+// them. Both have the same scores and errors of sensors, so that this is what the effect moves them by. Trials that are
+// of different lengths, as one fell, cannot be compared and count as the others do in the mean.
 class OutsideScales {
  public:
-  explicit OutsideScales(WalkDesign design) : design_(std::move(design)), without_(likelihood()) {}
+  explicit OutsideScales(WalkDesign design) : design_(std::move(design)), without_(weighed()) {}
   double power(const dynamics::OutsideEffect& effect) {
     design_.reality.outside = {effect};
-    return 2 * (without_ - likelihood());
+    const std::vector<Weighed> with = weighed();
+    double sum = 0, compared = 0;
+    for (std::size_t t = 0; t < with.size(); ++t)
+      if (with[t].events == without_[t].events) sum += without_[t].likelihood - with[t].likelihood, ++compared;
+    return compared > 0 ? 2 * sum * static_cast<double>(with.size()) / compared : 0;
   }
 
  private:
-  double likelihood() const {
+  struct Weighed {
+    double likelihood = 0;
+    std::size_t events = 0;
+  };
+
+  // Returns the log likelihood of each trial.
+  std::vector<Weighed> weighed() const {
     WalkStatement statement{"power", {}, {}};
     statement.walker.setting = design_.truth;
     const auto walks = parse_walks(source_of(files_of(design_, statement), "laboratory"));
     const auto model = machine_transitions(walks->machine, walks->runs);
-    return fit(*model, nominal_values(*model), {}).log_likelihood;
+    const Fit fitted = fit(*model, nominal_values(*model), {});
+    std::vector<Weighed> trials(walks->runs.trials.size());
+    for (std::size_t e = 0; e < model->events().size(); ++e) {
+      Weighed& trial = trials[model->events()[e].trial];
+      trial.likelihood += fitted.evaluation.log_density[e];
+      ++trial.events;
+    }
+    return trials;
   }
 
   WalkDesign design_;
-  double without_;
+  std::vector<Weighed> without_;
 };
 
 // Sizes the effect that no catalogue holds and adds it to the design and the truth.
