@@ -179,7 +179,9 @@ class Course {
 
 /// Finds where `sign` times a quantity goes from positive at `low` to not positive at `high`: Newton's steps from where
 /// the chord does, halved intervals where those leave the bracket.
-double falling_root(double low, double high, double at_low, double at_high, const Course& course, double sign = 1) {
+/// @param course  has with_rate(): the quantity and its rate at a time
+template <class AnyCourse>
+double falling_root(double low, double high, double at_low, double at_high, const AnyCourse& course, double sign = 1) {
   double time = sign * at_low > 0 && sign * at_high < 0 ? low + (high - low) * at_low / (at_low - at_high) : high;
   for (int iteration = 0; iteration < 60; ++iteration) {
     const auto [now, rate] = course.with_rate(time);
@@ -216,12 +218,21 @@ std::optional<double> strike_time(const Motion& m, std::size_t lane, double step
 /// The same where the swing leg is `ratio` times as long as the stance leg: its foot is over the ground by cos theta -
 /// ratio cos psi stance legs, and before the stance foot by ratio sin psi - sin theta.
 std::optional<double> strike_time(const Motion& m, std::size_t lane, double step, const Motion& end, double ratio) {
-  const auto over = [&](double t) { return std::cos(at(m.theta, lane, t)) - ratio * std::cos(at(m.psi, lane, t)); };
-  const auto rate = [&](double t) {
-    return ratio * std::sin(at(m.psi, lane, t)) * at(m.nu, lane, t) -
-           std::sin(at(m.theta, lane, t)) * at(m.omega, lane, t);
+  struct Height {
+    const Motion& m;
+    std::size_t lane;
+    double ratio;
+    std::pair<double, double> with_rate(double t) const {
+      const double theta = at(m.theta, lane, t), psi = at(m.psi, lane, t);
+      return {std::cos(theta) - ratio * std::cos(psi),
+              ratio * std::sin(psi) * at(m.nu, lane, t) - std::sin(theta) * at(m.omega, lane, t)};
+    }
   };
-  if (std::cos(end.theta[0][lane]) - ratio * std::cos(end.psi[0][lane]) > 0) return std::nullopt;
+  const Height height{m, lane, ratio};
+  const auto over = [&](double t) { return height.with_rate(t).first; };
+  const auto rate = [&](double t) { return height.with_rate(t).second; };
+  const double ends = std::cos(end.theta[0][lane]) - ratio * std::cos(end.psi[0][lane]);
+  if (ends > 0) return std::nullopt;
   double low = 0;
   if (!(over(0) > 0)) {
     // The foot may have risen and come down within the step; it is highest where halved intervals of the rate lead.
@@ -233,7 +244,7 @@ std::optional<double> strike_time(const Motion& m, std::size_t lane, double step
     }
     if (!(over(low) > 0)) return std::nullopt;
   }
-  const double time = falling_root(low, step, over, rate);
+  const double time = falling_root(low, step, over(low), ends, height);
   const double theta = at(m.theta, lane, time);
   if (!(ratio * std::sin(at(m.psi, lane, time)) > std::sin(theta) && std::cos(theta) > 0)) return std::nullopt;
   return time;
