@@ -43,7 +43,7 @@ set(ROOMS
   "reports/description: dynamics/wheel analysis/statistics analysis/description analysis/paper reports/output"
   "reports/diagnosis: dynamics/catalogue analysis/statistics analysis/diagnosis analysis/blind reports/output"
   "reports/study: markov/transition_rows dynamics/wheel analysis/statistics analysis/walkers analysis/study analysis/experiment analysis/paper analysis/sensitivity reports/output"
-  "reports/import: analysis/experiment analysis/motion_capture reports/output"
+  "reports/import: analysis/experiment analysis/motion_capture analysis/walker_model reports/output"
   "reports/commands: markov markov/passage markov/mesh dynamics/wheel analysis/statistics analysis/walkers analysis/diagnosis analysis/study analysis/experiment analysis/description analysis/walker_model analysis/blind analysis/motion_capture analysis/paper analysis/sensitivity reports/output reports/study reports/import"
   "reports/experiment_commands: markov dynamics/catalogue dynamics/wheel analysis/statistics analysis/diagnosis analysis/study analysis/experiment analysis/description analysis/walker_model analysis/experiment_model analysis/blind analysis/motion_capture analysis/paper reports/output reports/description reports/diagnosis reports/study reports/import reports/commands"
   "reports/command_line: dynamics/catalogue dynamics/wheel analysis/study analysis/experiment analysis/wheel_model analysis/walker_model analysis/sensitivity reports/output reports/commands reports/experiment_commands"

@@ -14,7 +14,6 @@
 #include "reports/command_line/option_values.h"
 #include "reports/command_line/setting_options.h"
 #include "reports/experiment_commands/import_command.h"
-#include "reports/import/imported_experiment.h"
 #include "reports/output/input_file.h"
 
 namespace metastable::reports {

@@ -218,6 +218,11 @@ MappedColumn found_column(const RequestedColumn& request, std::span<const std::s
 
 std::string_view role_name(Role role) { return info(role).name; }
 
+std::vector<std::string> outcome_names(Subject subject) {
+  if (subject == Subject::walks) return {"failed", "stopped", "lost"};
+  return {"rest", "end_of_ramp", "max_collisions"};
+}
+
 std::string_view column_in_folder(Role role) { return info(role).in_folder; }
 
 std::optional<double> ImportedRow::*value_member(Role role) { return info(role).member; }

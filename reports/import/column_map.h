@@ -37,6 +37,9 @@ enum class Subject { wheel, walks };
 
 std::string_view role_name(Role role);
 
+/// Returns what may come of a trial, as the folder has it.
+std::vector<std::string> outcome_names(Subject subject);
+
 /// Returns the name of its column in an experiment folder.
 std::string_view column_in_folder(Role role);
 

@@ -229,11 +229,6 @@ void read_back(Imported& imported, Subject subject) {
 
 }  // namespace
 
-std::vector<std::string> outcome_names(Subject subject) {
-  if (subject == Subject::walks) return {"failed", "stopped", "lost"};
-  return {"rest", "end_of_ramp", "max_collisions"};
-}
-
 Imported imported_experiment(const std::string& file, std::vector<ImportedRow> rows, const ImportOptions& options) {
   const bool walks = options.subject == Subject::walks;
   const auto told = [&](std::optional<double> ImportedRow::*what) {

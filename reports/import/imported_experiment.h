@@ -33,9 +33,6 @@ struct Imported {
   std::vector<std::string> assumed, notes;  ///< a sentence each
 };
 
-/// Returns what may come of a trial, as the folder has it.
-std::vector<std::string> outcome_names(Subject subject);
-
 /// Everything that reading an experiment folder checks is checked here, and said of the place in the foreign file.
 /// @param file  for messages
 /// @throws analysis::InputError with all defects

@@ -173,7 +173,7 @@ TEST_F(Refusals, OfWrongWordsHintAtTheNearest) {
        "--spacing: has no meaning under --method splitting"},
       {{"steps", "--walker", "compass", "--slope-sd", "1", "--tolerance", "0.1"},
        "--tolerance: has a meaning under --method splitting only"},
-      {{"steps", "--method", "splitting"}, "method: 'splitting' is neither 'sampled' nor 'integrated'"},
+      {{"steps", "--method", "splitting"}, "method: 'splitting' is neither 'sampled' nor 'integrated', which wheels have"},
       {{"steps", "--walker", "compas", "--slope-sd", "1"},
        "--walker: 'compas' is none of simplest, compass; did you mean 'compass'?"},
       {{"blind", "opne", "run"}, "ACTION: 'opne' is none of make, answer, open; did you mean 'open'?"},
