@@ -163,7 +163,7 @@ Eight RodWalker::forces(const State& s, double time) const {
   const double down = o.gravity * std::cos(slope_);
   if (o.sway != 0) {
     const double turn = 2 * std::numbers::pi * ramp_frequency;
-    along += o.sway * turn * turn * std::cos(turn * time + o.sway_phase);
+    along += o.sway * turn * turn * std::cos(turn * time + o.sway_phase_rad);
   }
   for (std::size_t i = 0; i < count(); ++i) {
     f[2 * i] = mass(i) * along;

@@ -37,7 +37,7 @@ struct RodWalkerOptions {
   double drive_torque = 0;  ///< [N m] of a motor that swings the leg forward, and reaches it with a lag of 0.3 s
   double load_mass = 0;     ///< [kg], hung from the hip on a cord of 0.25 m
   double sway = 0;          ///< [m], amplitude of the ramp along itself, at 0.6 Hz
-  double sway_phase = 0;    ///< [rad] of it at time 0
+  double sway_phase_rad = 0;    ///< [rad] of it at time 0
 };
 
 /// One of the point masses. Axes: x along the slope, downhill; y normal to it, up.

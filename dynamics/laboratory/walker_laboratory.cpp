@@ -152,7 +152,7 @@ WalkedTrial WalkerLaboratory::run(std::size_t index) const {
   const std::uint64_t seed = setup_.seed;
   const std::array<double, 4> own = normals_of(seed, index, 0, WalkDraw::trial);
   RodWalkerOptions options = walker_;
-  options.sway_phase = 2 * std::numbers::pi * uniforms_of(seed, index, 0, WalkDraw::sway)[0];
+  options.sway_phase_rad = 2 * std::numbers::pi * uniforms_of(seed, index, 0, WalkDraw::sway)[0];
   const auto launched = [&](double value, std::size_t i) { return value * (1 + setup_.launch_spread * own[i]); };
   const RodStride launch{launched(setup_.launch.half_angle, 1), launched(setup_.launch.stance_rate, 2),
                          launched(setup_.launch.swing_rate, 3)};
