@@ -54,7 +54,7 @@ def options():
 
 def wrong_values(option, value):
     """What no option of that kind takes: as Python says it, and as text."""
-    if re.fullmatch("[a-z]+(\\|[a-z]+)+", value):
+    if re.fullmatch("[a-z]+(\\|[a-z]+)*", value):
         word = value.split("|")[-1]
         return [(word[1] + word[0] + word[2:], word[1] + word[0] + word[2:])]
     if value == "":
@@ -78,7 +78,7 @@ def ask(command, option, given):
     argument, more = argument_of(option), {}
     setting = metastable.WalkerSetting if option in of_walkers else metastable.Setting
     fields = dict(walker if option in of_walkers else wheel)
-    if argument in setting.__dataclass_fields__ and (command, option) not in (("sweep", "slope"), ("blind", "law")):
+    if argument in setting.__dataclass_fields__ and (command, option) not in (("sweep", "slope"), ("blind", "law"), ("blind", "walker")):
         setting(**{**fields, argument: given})
     else:
         more = {argument: given}
@@ -116,6 +116,8 @@ def words(command, option, text):
         said += ["--friction-mean", "0.3,0.4"] if not option.endswith(("-mean", "-sd")) else []
     if command == "compare" and option == "initial-speed":
         said += [f"--{option}={text}"]
+    if command == "blind":
+        return [*said, f"--{option}={text}"]
     if option in of_walkers - {"walker"}:
         said += ["--walker", "simplest"]
     if option in of_walkers - {"slope-sd"}:
