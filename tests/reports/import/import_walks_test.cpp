@@ -1,0 +1,87 @@
+// metastable import --walker: walks that a CSV tells come back as the same walks.
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <numbers>
+#include <string>
+
+#include "analysis/walker_model/walk_folder.h"
+#include "tests/reports/import/importing.h"
+
+namespace metastable::reports::test {
+namespace {
+
+// Walks of which one fell; the file has degrees, mixes the rows of the trials, and lacks a rate.
+TEST_F(Import, WalksInOtherWordsAndUnits) {
+  const std::string csv = file("walks.csv",
+                               "run,k,foot,theta [deg],rate [deg/s],end\n1,0,0,15,-60,ok\n2,0,1,15.5,-61,fell\n"
+                               "1,1,1,15.2,NaN,ok\n2,1,0,14.9,-59,fell\n");
+  const Words words{csv,
+                    "--walker",
+                    "compass",
+                    "--slope",
+                    "3",
+                    "--slope-sd",
+                    "0.3",
+                    "--collisions-from",
+                    "0",
+                    "--legs-from",
+                    "0",
+                    "--outcomes",
+                    "failed=fell,stopped=ok",
+                    "--errors",
+                    "half_angle=0.0005",
+                    "--columns",
+                    "trial=run,step=k,phase=foot,half_angle=theta,stance_rate=rate,outcome=end"};
+  const Ran ran = import(words);
+  ASSERT_EQ(ran.code, 0) << ran.err;
+  EXPECT_EQ(ran.out.substr(0, ran.out.find('\n')), path("out") + ": 2 trials, 4 steps");
+  const auto walks = analysis::read_walks(folder_ / "out");
+  ASSERT_TRUE(walks);
+  ASSERT_EQ(walks->runs.trials.size(), 2u);
+  const analysis::MachineTrial& first = walks->runs.trials[0];
+  ASSERT_EQ(first.rows.size(), 2u);
+  EXPECT_EQ(first.outcome, analysis::MachineOutcome::stopped);
+  EXPECT_EQ(walks->runs.trials[1].outcome, analysis::MachineOutcome::failed);
+  EXPECT_EQ(first.rows[0].inputs, std::vector<double>{1});
+  EXPECT_NEAR(first.rows[0].seen[0], 15 * std::numbers::pi / 180, 1e-15);
+  EXPECT_TRUE(std::isnan(first.rows[1].seen[1]));
+  EXPECT_EQ(walks->machine->observe.size(), 2u);
+  EXPECT_EQ(walks->machine->observe[0].sd, 0.0005);
+  EXPECT_FALSE(walks->machine->observe[1].sd);
+}
+
+TEST_F(Import, WideWalks) {
+  const std::string csv = file("wide.csv", "run,a1,a2,a3\n1,0.27,,0.26\n2,0.28,0.27,\n");
+  const Ran ran = import({csv, "--walker", "simplest", "--slope", "0.5", "--slope-sd", "0.05", "--columns",
+                          "trial=run,half_angle=a*[rad]"});
+  ASSERT_EQ(ran.code, 0) << ran.err;
+  EXPECT_EQ(read(folder_ / "out" / "steps.csv"),
+            "trial,step,half_angle_rad\n1,1,0.27\n1,2,\n1,3,0.26\n2,1,0.28\n2,2,0.27\n");
+}
+
+TEST_F(Import, NamesWhatWalksLack) {
+  const std::string csv = file("a.csv", "run,foot,theta\n1,0,15\n1,1,14\n");
+  const auto walks = [&](Words more) {
+    Words words{csv, "--walker", "compass"};
+    words.insert(words.end(), more.begin(), more.end());
+    words.insert(words.end(), {"--slope", "3"});
+    return import(words);
+  };
+  expect_refused(walks({}), "--slope-sd: is needed with --walker");
+  expect_refused(walks({"--slope-sd", "0.3", "--mass", "1"}), "--mass: has no meaning with --walker");
+  expect_refused(walks({"--slope-sd", "0.3"}),
+                 "--columns: which column of " + csv + " is half_angle? It has run, foot, theta");
+  expect_refused(walks({"--slope-sd", "0.3", "--columns", "trial=run,omega_minus=theta[deg/s]"}),
+                 "--columns: 'omega_minus=theta[deg/s]' is not WHAT=NAME or WHAT=NAME[UNIT], where WHAT is one of "
+                 "condition, trial, time, position, outcome, step, phase, half_angle, stance_rate, swing_rate");
+  expect_refused(walks({"--slope-sd", "0.3", "--columns", "trial=run,phase=foot,half_angle=theta[deg]"}),
+                 csv + ":2: phase: 0 is outside 1..2");
+  expect_refused(walks({"--slope-sd", "0.3", "--errors", "theta=1"}),
+                 "--errors: 'theta' is none of half_angle, stance_rate, swing_rate");
+  expect_refused(import({csv, "--slope", "3", "--slope-sd", "0.3"}), "--slope-sd: has a meaning with --walker only");
+}
+
+}  // namespace
+}  // namespace metastable::reports::test
