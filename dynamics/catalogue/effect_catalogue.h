@@ -21,6 +21,10 @@ struct EffectParameter {
   bool per_leg = false;  ///< a list, one value a leg
 };
 
+/// Describes a number on a range. @param neutral  as EffectParameter's
+EffectParameter effect_parameter(std::string name, std::string unit, std::optional<double> neutral, double lower,
+                                 double upper, std::string meaning);
+
 /// Describes one effect. eta and mu stand for the restitution and friction drawn at a collision.
 struct EffectInfo {
   std::string id;

@@ -12,12 +12,7 @@ namespace {
 
 EffectParameter sized(std::string name, std::string unit, double lower, double upper, std::string meaning,
                       double neutral = 0) {
-  return {.name = std::move(name),
-          .unit = std::move(unit),
-          .neutral = neutral,
-          .lower = lower,
-          .upper = upper,
-          .meaning = std::move(meaning)};
+  return effect_parameter(std::move(name), std::move(unit), neutral, lower, upper, std::move(meaning));
 }
 
 void add_sensors(std::vector<EffectInfo>& all) {

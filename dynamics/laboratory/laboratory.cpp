@@ -1,6 +1,5 @@
 #include "dynamics/laboratory/laboratory.h"
 
-#include <Random123/philox.h>
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -11,6 +10,7 @@
 #include <utility>
 
 #include "dynamics/laboratory/impulse_collision.h"
+#include "dynamics/laboratory/laboratory_draws.h"
 #include "dynamics/laboratory/rigid_roll.h"
 
 namespace metastable::dynamics {
@@ -21,19 +21,14 @@ constexpr double reference_speed = 5;  // [rad/s] of the catalogue's power laws
 constexpr double slosh_time = 0.15;    // [s]
 constexpr double lead = 0.3;           // [s] of motion kept before collision 1
 
-enum class Stream : std::uint64_t { trial = 100, contact = 101, sensor = 102 };
-
 // Each event of a trial has three standard normal scores and a uniform.
 struct Draws {
   std::array<double, 3> score;
   double uniform;
 };
-Draws draws(std::uint64_t seed, std::uint64_t trial, std::uint64_t event, Stream stream) {
-  const r123::Philox4x64::ctr_type counter{{trial, event, static_cast<std::uint64_t>(stream), 0}};
-  const auto bits = r123::Philox4x64()(counter, r123::Philox4x64::key_type{{seed, 0}});
-  const auto uniform = [](std::uint64_t word) { return (static_cast<double>(word >> 12) + 0.5) * 0x1p-52; };
-  return {{normal_quantile(uniform(bits[0])), normal_quantile(uniform(bits[1])), normal_quantile(uniform(bits[2]))},
-          uniform(bits[3])};
+Draws draws(std::uint64_t seed, std::uint64_t trial, std::uint64_t event, LaboratoryDraw purpose) {
+  const std::array<double, 4> u = laboratory_uniforms(seed, trial, event, purpose);
+  return {{normal_quantile(u[0]), normal_quantile(u[1]), normal_quantile(u[2])}, u[3]};
 }
 
 // Has mean 0, sd 1 and the given skewness at a standard normal score: a shifted lognormal (mirrored, if negative).
@@ -164,7 +159,7 @@ class Laboratory::Roll {
         index_(index),
         body_(lab.body_[condition_]),
         surface_(lab.surface_[condition_]) {
-    const Draws own = draws(lab.setup_.seed, index, 0, Stream::trial);
+    const Draws own = draws(lab.setup_.seed, index, 0, LaboratoryDraw::trial);
     const auto trials = static_cast<double>(lab.setup_.order.size());
     launch_ = lab.launch_[condition_].at_score(own.score[0]);
     added_friction_ = c_.trial_sd * own.score[1];
@@ -261,7 +256,7 @@ class Laboratory::Roll {
 
   // Draws eta and mu of the collision that comes, effects included.
   Contact draw(int leg, double position, double speed, double time) {
-    const Draws d = draws(lab_.setup_.seed, index_, trial_.collisions.size() + 1, Stream::contact);
+    const Draws d = draws(lab_.setup_.seed, index_, trial_.collisions.size() + 1, LaboratoryDraw::contact);
     remember(d.score);
     Contact contact{0, lab_.friction_.at_score(friction_score_[0])};
     if (lab_.setup_.restitution_skewness == 0)
@@ -401,7 +396,7 @@ class Laboratory::Roll {
 
   // @param event of the sensor: 2 k before collision k, from 0, and 2 k + 3 after it
   double sensed(double speed, std::size_t event) const {
-    const Draws d = draws(lab_.setup_.seed, index_, event, Stream::sensor);
+    const Draws d = draws(lab_.setup_.seed, index_, event, LaboratoryDraw::sensor);
     const double noise = lab_.setup_.sensor_noise * d.score[0] + c_.sensor_noise * d.score[1];
     return std::max(0.0, speed + c_.sensor_bias + noise);
   }

@@ -32,12 +32,12 @@ struct RodWalkerOptions {
   double foot_slip = 0;     ///< [m] by which the struck foot slips on, away from the other, as it is loaded
 
   // No model of a walker in dynamics/walkers has these.
-  double foot_radius = 0;   ///< [m], in [0, length of a leg): feet are arcs that roll
-  double hip_spring = 0;    ///< [N m/rad], draws the legs together
-  double drive_torque = 0;  ///< [N m] of a motor that swings the leg forward, and reaches it with a lag of 0.3 s
-  double load_mass = 0;     ///< [kg], hung from the hip on a cord of 0.25 m
-  double sway = 0;          ///< [m], amplitude of the ramp along itself, at 0.6 Hz
-  double sway_phase_rad = 0;    ///< [rad] of it at time 0
+  double foot_radius = 0;     ///< [m], in [0, length of a leg): feet are arcs that roll
+  double hip_spring = 0;      ///< [N m/rad], draws the legs together
+  double drive_torque = 0;    ///< [N m] of a motor that swings the leg forward, and reaches it with a lag of 0.3 s
+  double load_mass = 0;       ///< [kg], hung from the hip on a cord of 0.25 m
+  double sway = 0;            ///< [m], amplitude of the ramp along itself, at 0.6 Hz
+  double sway_phase_rad = 0;  ///< [rad] of it at time 0
 };
 
 /// One of the point masses. Axes: x along the slope, downhill; y normal to it, up.

@@ -1,6 +1,5 @@
 #include "dynamics/laboratory/walker_laboratory.h"
 
-#include <Random123/philox.h>
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -15,6 +14,7 @@
 #include <utility>
 
 #include "dynamics/catalogue/walker_effects.h"
+#include "dynamics/laboratory/laboratory_draws.h"
 #include "dynamics/numerics/truncated_normal.h"
 
 namespace metastable::dynamics {
@@ -24,28 +24,11 @@ constexpr double radians = std::numbers::pi / 180;
 constexpr double outlier_ratio = 4;     // of the slope's spread, as the catalogue has it
 constexpr double clock_for_a_step = 2;  // [s] that the clock leaves for a step of each trial
 
-// What draws are for; those of wheels are 100 to 102.
-enum class WalkDraw : std::uint64_t { slope = 110, sensor = 111, noise = 112, trial = 113, sway = 114 };
-
-std::array<double, 4> uniforms_of(std::uint64_t seed, std::uint64_t trial, std::uint64_t step, WalkDraw purpose) {
-  const r123::Philox4x64::ctr_type counter{{trial, step, static_cast<std::uint64_t>(purpose), 0}};
-  const auto bits = r123::Philox4x64()(counter, r123::Philox4x64::key_type{{seed, 0}});
-  std::array<double, 4> all{};
-  for (std::size_t i = 0; i < 4; ++i) all[i] = (static_cast<double>(bits[i] >> 12) + 0.5) * 0x1p-52;
-  return all;
-}
-
-std::array<double, 4> normals_of(std::uint64_t seed, std::uint64_t trial, std::uint64_t step, WalkDraw purpose) {
-  std::array<double, 4> all = uniforms_of(seed, trial, step, purpose);
-  for (double& one : all) one = normal_quantile(one);
-  return all;
-}
-
 void require_walk(bool fine, const char* name, double value, const char* range) {
   if (!fine) throw std::invalid_argument(fmt::format("laboratory: {}: {} is outside {}", name, value, range));
 }
 
-// Where each outside effect acts.
+// Returns the number of the walker that an outside effect sets.
 double& size_of(RodWalkerOptions& walker, std::string_view id) {
   if (id == "round_feet") return walker.foot_radius;
   if (id == "hip_spring") return walker.hip_spring;
@@ -150,9 +133,9 @@ double WalkerLaboratory::slope(const WalkedRow& row, std::size_t trial, double o
 
 WalkedTrial WalkerLaboratory::run(std::size_t index) const {
   const std::uint64_t seed = setup_.seed;
-  const std::array<double, 4> own = normals_of(seed, index, 0, WalkDraw::trial);
+  const std::array<double, 4> own = laboratory_normals(seed, index, 0, LaboratoryDraw::walk_trial);
   RodWalkerOptions options = walker_;
-  options.sway_phase_rad = 2 * std::numbers::pi * uniforms_of(seed, index, 0, WalkDraw::sway)[0];
+  options.sway_phase_rad = 2 * std::numbers::pi * laboratory_uniforms(seed, index, 0, LaboratoryDraw::walk_sway)[0];
   const auto launched = [&](double value, std::size_t i) { return value * (1 + setup_.launch_spread * own[i]); };
   const RodStride launch{launched(setup_.launch.half_angle, 1), launched(setup_.launch.stance_rate, 2),
                          launched(setup_.launch.swing_rate, 3)};
@@ -160,17 +143,17 @@ WalkedTrial WalkerLaboratory::run(std::size_t index) const {
   const double start = clock_for_a_step * static_cast<double>(setup_.longest) * static_cast<double>(index);
   const double first_foot = walker.position();
   WalkedTrial trial;
-  double last_score = normals_of(seed, index, 1, WalkDraw::trial)[0];
+  double last_score = laboratory_normals(seed, index, 1, LaboratoryDraw::walk_trial)[0];
   for (;;) {
     const std::uint64_t step = trial.rows.size();
     WalkedRow row{walker.stance_leg() + 1, start + walker.time(), walker.position() - first_foot, walker.stride(), {}};
-    const std::array<double, 4> errors = normals_of(seed, index, step, WalkDraw::sensor);
-    const std::array<double, 4> noise = normals_of(seed, index, step, WalkDraw::noise);
+    const std::array<double, 4> errors = laboratory_normals(seed, index, step, LaboratoryDraw::walk_sensor);
+    const std::array<double, 4> noise = laboratory_normals(seed, index, step, LaboratoryDraw::walk_noise);
     std::array<double, 3> seen = numbers_of(row.truth);
     for (std::size_t i = 0; i < 3; ++i)
       seen[i] += setup_.sensor_sd[i] * errors[i] + added_noise_[i] * noise[i] + bias_[i];
     row.seen = {seen[0], seen[1], seen[2]};
-    const std::array<double, 4> drawn = uniforms_of(seed, index, step, WalkDraw::slope);
+    const std::array<double, 4> drawn = laboratory_uniforms(seed, index, step, LaboratoryDraw::walk_slope);
     double score = normal_quantile(drawn[0]);
     if (drawn[1] < terrain_.outliers) score *= outlier_ratio;
     score = terrain_.memory * last_score + std::sqrt(1 - terrain_.memory * terrain_.memory) * score;
