@@ -31,7 +31,7 @@ constexpr std::array<std::pair<std::string_view, BlindKind>, 7> kinds{{{"none", 
                                                                        {"mixed", BlindKind::mixed},
                                                                        {"many", BlindKind::many}}};
 
-// What cases can be of.
+// Holds the effects, and those from outside, that cases are drawn from.
 struct CaseCatalogue {
   const std::vector<dynamics::EffectInfo>& effects;
   const std::vector<dynamics::OutsideInfo>& outside;

@@ -10,7 +10,7 @@
 namespace metastable::analysis {
 namespace {
 
-// What the draws of one effect start from.
+// Holds the id of an effect and the random numbers from which its values are drawn.
 struct WalkerDraw {
   std::string id;
   BlindDice& dice;

@@ -97,7 +97,7 @@ Named give_verdict(const Probabilities& probabilities, const Odds& unnamed, cons
                    const std::vector<Detectability>& visible, const Diagnosis::Data& data,
                    const std::string& recalibration_id, const Rules& rules);
 
-/// What stays of the gap beside the effects at work, at the lower ends of its 90 % intervals.
+/// Holds how much of the gap stays beside the effects at work: the lower ends of 90 % intervals.
 struct Stays {
   double share = 0;  ///< of the held-out gap as given
   double nats = 0;   ///< a collision, held out

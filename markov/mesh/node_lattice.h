@@ -55,7 +55,7 @@ class NodeTable {
  public:
   static constexpr std::uint32_t none = 0xffffffffU;
   std::uint32_t find(std::uint64_t key) const;
-  /// Has the memory fetched where a key will be looked for.
+  /// Starts to fetch the slot from memory in which a key will be looked for soon; changes nothing.
   void fetch(std::uint64_t key) const {
     if (!slot_.empty()) __builtin_prefetch(&slot_[first_slot(key, slot_.size())]);
   }

@@ -13,9 +13,9 @@
 namespace metastable::markov {
 
 /// Holds where one state leads under every value of one score: places that were stepped, ascending, and between
-/// neighbours that both survive the polynomial through the nearest six, in coordinates of the lattice that it lands on. A
-/// gap that the polynomial through its neighbours does not foretell is halved, and so is one at whose ends different things
-/// happen.
+/// neighbours that both survive the polynomial through the nearest six, in coordinates of the lattice that it lands on.
+/// A gap that the polynomial through its neighbours does not foretell is halved, and so is one at whose ends different
+/// things happen.
 class ScoreCurve {
  public:
   enum class Fate : std::uint8_t { lands, fails, leaves };

@@ -118,7 +118,7 @@ TEST(LaboratoryAgreement, EveryEffectOfTheCatalogueHasItsPlaces) {
   EXPECT_TRUE(rightful_places("sloshing_fluid").empty());
 }
 
-// What a candidate reports of a form is the effect that the form stands for.
+// A candidate makes a fitted form of each effect, and reports that form as the same effect.
 TEST(LaboratoryAgreement, FormsAreTheInverseOfReports) {
   const auto model = model_of(with_effect(stand_in_setting(), {"slip_reversal", {}}, {}));
   for (const SizedEffect& sized : sized_effects()) {

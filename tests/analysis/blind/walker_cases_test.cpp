@@ -65,7 +65,7 @@ TEST(WalkerAgreement, EveryEffectOfTheCatalogueHasItsPlaces) {
   EXPECT_TRUE(rightful_walker_places("round_feet").empty());
 }
 
-// What a candidate reports of a form is the effect that the form stands for.
+// A candidate makes a fitted form of each effect, and reports that form as the same effect.
 TEST(WalkerAgreement, FormsAreTheInverseOfReports) {
   const Walks walks = laboratory_walks_with({}, 6);
   const auto model = machine_transitions(walks.machine, walks.runs);

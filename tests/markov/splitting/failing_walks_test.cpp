@@ -22,7 +22,7 @@ FailingWalks walks_of(std::vector<double> weights) {
   return walks;
 }
 
-// What is kept stands at even places along the weights: a walk of half the weight is half of it.
+// Walks are kept at even places along the weights: one that has half of the whole weight becomes half of those kept.
 TEST(FailingWalks, AreThinnedByWeight) {
   FailingWalks walks = walks_of({1, 4, 1, 1, 1});
   walks.thin(8, 0.5);
