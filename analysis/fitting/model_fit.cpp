@@ -4,6 +4,7 @@
 #include <boost/math/tools/minima.hpp>
 #include <cmath>
 #include <iterator>
+#include <optional>
 
 #include "markov/dense_matrix.h"
 
@@ -356,14 +357,16 @@ std::vector<double> given_values(const TransitionModel& model) {
 
 Fit best_fit(const TransitionModel& model, const std::vector<double>& nuisance, const std::vector<EffectTerm>& terms,
              const FitOptions& options) {
-  Fit best = fit(model, nuisance, terms, options);
   const std::vector<FitStart> starts = model.starts(terms);
+  std::optional<Fit> found;
+  if (std::ranges::none_of(starts, &FitStart::alone)) found = fit(model, nuisance, terms, options);
   for (const FitStart& start : starts) {
     std::vector<EffectTerm> moved = terms;
     for (std::size_t i = 0; i < moved.size(); ++i) moved[i].values = start.values[i];
     Fit tried = fit(model, start.nuisance, moved, options);
-    if (tried.penalised > best.penalised || !std::isfinite(best.penalised)) best = std::move(tried);
+    if (!found || tried.penalised > found->penalised || !std::isfinite(found->penalised)) found = std::move(tried);
   }
+  Fit best = std::move(*found);
   if (!starts.empty() && !best.converged && std::isfinite(best.penalised)) {  // the last stretch of the way
     FitOptions longer = options;
     longer.most_iterations *= 3;

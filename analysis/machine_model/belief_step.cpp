@@ -51,7 +51,7 @@ template <int Most>
 BeliefStep<Most>::BeliefStep(MachineStepper& stepper, const ScorePlan& plan, std::size_t shared, bool bent)
     : stepper_(stepper), lattice_{plan.lattice, {}}, fails_(plan.failing.has_value()), shared_(shared), bent_(bent) {
   std::vector<std::size_t>& scores = lattice_.scores;
-  if (!scores.empty()) lattice_.axis = lattice_axis(static_cast<int>(scores.size()));
+  if (!scores.empty()) lattice_.axis = lattice_axis(static_cast<int>(scores.size()), bent);
   if (plan.failing && scores.front() != *plan.failing) std::swap(scores.front(), scores.back());
   for (std::size_t m = 0; m < stepper_.scores(); ++m)
     if (std::ranges::find(lattice_.scores, m) == lattice_.scores.end()) straight_.push_back(m);

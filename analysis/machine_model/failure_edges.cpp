@@ -10,10 +10,10 @@
 namespace metastable::analysis {
 namespace {
 
-// An edge of failure lies between two points of the lattice; each round divides what it lies in.
-constexpr int divisions = 8, parts_of_edge = 4;
+// An edge of failure lies between two points of the lattice; each round halves what it lies in.
+constexpr int halvings = 16;
 // Points to either side of an edge from the mean, among which other states have theirs.
-constexpr std::size_t about_an_edge = 3;
+constexpr std::size_t about_an_edge = 2;
 constexpr double next_to_nothing = 1e-5;  // a chance of failure, or a weight of cells
 constexpr double near_the_middle = 2.1;   // sds of the other score within which lines are sought that tell of the rest
 constexpr std::ptrdiff_t worth_telling = 4;  // such lines, from which on three tell of them all
@@ -261,34 +261,26 @@ void FailureEdges<Most>::find_edges(std::span<Line* const> lines, std::span<cons
         edges.push_back({lines[l], lattice_.axis.points[i], lattice_.axis.points[i + 1], here[i] != 0, counts});
       }
   }
-  for (int round = 0; round < divisions; ++round) divide(edges, places, stepper);
+  for (int round = 0; round < halvings; ++round) halve(edges, places, stepper);
   for (const Edge& edge : edges) edge.line->edges.push_back(0.5 * (edge.low + edge.high));
 }
 
-// Divides what each edge lies in, and keeps the part that holds it.
+// Halves what each edge lies in.
 template <int Most>
-void FailureEdges<Most>::divide(std::vector<Edge>& edges, std::span<const TransitionPlace> places,
-                                MachineStepper& stepper) const {
+void FailureEdges<Most>::halve(std::vector<Edge>& edges, std::span<const TransitionPlace> places,
+                               MachineStepper& stepper) const {
+  if (std::ranges::none_of(edges, &Edge::counts)) return;
   stepper.clear();
   for (const Edge& edge : edges) {
-    const Line& line = *edge.line;
-    Vector fresh = scores_at(line.first);
-    for (int i = 1; i < parts_of_edge && edge.counts; ++i) {
-      fresh[static_cast<Eigen::Index>(lattice_.scores.front())] = edge.low + i * (edge.high - edge.low) / parts_of_edge;
-      stepper.add(places[line.trial], line.from, fresh);
-    }
-  }
-  if (std::ranges::any_of(edges, &Edge::counts)) stepper.run();
-  std::size_t first = 0;
-  for (Edge& edge : edges) {
     if (!edge.counts) continue;
-    std::size_t last = 0;  // points that are as the lower end
-    while (last + 1 < parts_of_edge && stepper.failed(first + last) != edge.low_alive) ++last;
-    const double width = (edge.high - edge.low) / parts_of_edge;
-    edge.low += static_cast<double>(last) * width;
-    edge.high = edge.low + width;
-    first += parts_of_edge - 1;
+    Vector fresh = scores_at(edge.line->first);
+    fresh[static_cast<Eigen::Index>(lattice_.scores.front())] = 0.5 * (edge.low + edge.high);
+    stepper.add(places[edge.line->trial], edge.line->from, fresh);
   }
+  stepper.run();
+  std::size_t point = 0;
+  for (Edge& edge : edges)
+    if (edge.counts) (stepper.failed(point++) != edge.low_alive ? edge.low : edge.high) = 0.5 * (edge.low + edge.high);
 }
 
 // The chance of failure on a line, times the share of the line among those of its state.

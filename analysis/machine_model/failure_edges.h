@@ -70,7 +70,7 @@ class FailureEdges {
   std::vector<char> goes_on(std::span<Line* const> lines, std::span<const TransitionPlace> places,
                             MachineStepper& stepper) const;
   void find_edges(std::span<Line* const> lines, std::span<const TransitionPlace> places) const;
-  void divide(std::vector<Edge>& edges, std::span<const TransitionPlace> places, MachineStepper& stepper) const;
+  void halve(std::vector<Edge>& edges, std::span<const TransitionPlace> places, MachineStepper& stepper) const;
   double chance_on(const Line& line) const;
 
   const MachineStepper& stepper_;

@@ -2,6 +2,7 @@
 // A machine that its user brings: a step map with names, what is known of its parameters, what is suspected of it, and
 // what was measured of it.
 
+#include <cmath>
 #include <cstdint>
 #include <functional>
 #include <limits>
@@ -36,6 +37,16 @@ struct MachineSensor {
   std::string state;
   std::optional<double> sd;  ///< of its error; nothing: fitted
   double correlation = 0;    ///< of the errors of neighbouring rows, in [-0.5, 0.5]
+
+  /// The error of a row in sds: own times a number of this row plus kept times that of the row before, both independent
+  /// standard normals.
+  struct SharedError {
+    double own, kept;
+  };
+  SharedError shared_error() const {
+    const double plus = std::sqrt(1 + 2 * correlation), minus = std::sqrt(1 - 2 * correlation);
+    return {0.5 * (plus + minus), 0.5 * (plus - minus)};
+  }
 };
 
 /// The distribution from which the first value of a state comes, where a trial's first row does not have it.

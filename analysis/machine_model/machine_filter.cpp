@@ -5,7 +5,6 @@
 #include <utility>
 
 #include "analysis/machine_model/belief_step.h"
-#include "analysis/machine_model/shared_error.h"
 #include "dynamics/numerics/truncated_normal.h"
 
 namespace metastable::analysis {
@@ -111,7 +110,7 @@ typename BeliefMixture<Most>::Part Follower<Most>::launched(const MachineRow& ro
     belief.mean[s] = row.seen[j] - (supposed_.bias.empty() ? 0 : supposed_.bias[j]);
     belief.covariance(s, s) = added_variance(j);
     if (shared_[j] < 0) continue;
-    const auto [own, kept] = shared_error(machine_.observe[j].correlation);
+    const auto [own, kept] = machine_.observe[j].shared_error();
     const double sd = supposed_.sensor_sd[j];
     belief.covariance(s, s) += sd * sd * (own * own + kept * kept);
     belief.covariance(s, size + shared_[j]) = belief.covariance(size + shared_[j], s) = -sd * own;
@@ -125,7 +124,7 @@ Look<Most> Follower<Most>::look(std::size_t sensor, Eigen::Index size) const {
                   added_variance(sensor)};
   look.weights[state_[sensor]] = 1;
   if (shared_[sensor] < 0) return look;
-  const auto [own, kept] = shared_error(machine_.observe[sensor].correlation);
+  const auto [own, kept] = machine_.observe[sensor].shared_error();
   const auto at = static_cast<Eigen::Index>(stepper_.size()) + shared_[sensor];
   look.weights[at] = supposed_.sensor_sd[sensor] * own;
   look.weights[at + shared_count_] = supposed_.sensor_sd[sensor] * kept;

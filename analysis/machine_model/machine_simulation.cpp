@@ -7,7 +7,6 @@
 
 #include "analysis/machine_model/machine_design.h"
 #include "analysis/machine_model/machine_stepper.h"
-#include "analysis/machine_model/shared_error.h"
 #include "analysis/statistics/random.h"
 #include "dynamics/numerics/truncated_normal.h"
 
@@ -87,7 +86,7 @@ std::size_t Walker::design_row(std::size_t trial, std::size_t row) const {
 }
 
 double Walker::error(std::size_t sensor, double now, double before) const {
-  const auto [own, kept] = shared_error(machine_.observe[sensor].correlation);
+  const auto [own, kept] = machine_.observe[sensor].shared_error();
   return supposed_.sensor_sd[sensor] * (own * now + kept * before);
 }
 

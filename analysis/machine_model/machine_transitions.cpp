@@ -14,6 +14,7 @@
 #include "analysis/machine_model/machine_filter.h"
 #include "analysis/machine_model/machine_simulation.h"
 #include "analysis/machine_model/machine_variations.h"
+#include "analysis/machine_model/tolerant_starts.h"
 
 namespace metastable::analysis {
 namespace {
@@ -45,6 +46,7 @@ class MachineTransitions : public TransitionModel {
     set_up_effects();
     list_events();
     require_noise();
+    starts_ = std::make_shared<TolerantStarts>(machine_, runs_);
   }
 
   const std::vector<Event>& events() const override { return events_; }
@@ -69,6 +71,13 @@ class MachineTransitions : public TransitionModel {
   }
   Evaluation evaluate(std::span<const double> nuisance, std::span<const EffectTerm> terms) const override {
     return follow_machine(*machine_, runs_, plan_, events_, hypothesis(nuisance, terms));
+  }
+  std::vector<FitStart> starts(std::span<const EffectTerm> terms) const override {
+    std::vector<FitStart> all = starts_->starts(terms);
+    for (FitStart& start : all)  // the share of wild rows is the last nuisance
+      for (std::size_t slot = start.nuisance.size(); slot < nuisances_.size(); ++slot)
+        start.nuisance.push_back(nuisances_[slot].nominal);
+    return all;
   }
   std::vector<double> rest_chances(std::span<const double> nuisance, std::span<const EffectTerm> terms) const override {
     std::vector<double> chances;
@@ -119,6 +128,7 @@ class MachineTransitions : public TransitionModel {
   std::vector<MachineVariation> varied_;
   std::vector<Variation> variations_;
   std::vector<std::string> notes_;
+  std::shared_ptr<const TolerantStarts> starts_;  // those of a copy are its own
 };
 
 void MachineTransitions::set_up_nuisances() {
@@ -205,6 +215,7 @@ std::unique_ptr<MachineTransitions> MachineTransitions::drawn(std::span<const do
   copy->variations_.clear();
   copy->set_up_effects();
   copy->list_events();
+  copy->starts_ = std::make_shared<TolerantStarts>(machine_, copy->runs_);
   return copy;
 }
 

@@ -18,8 +18,9 @@ struct LatticeAxis {
   std::vector<double> shares;   ///< of the points, by which a mean over the standard normal is taken; they add up to 1
 };
 
-/// @param axes  of the lattice: the more, the coarser they are, 1 or 2
-LatticeAxis lattice_axis(int axes);
+/// @param axes  of the lattice, 1 or 2: cells of two are wider
+/// @param bent  whether cells know how the map bends within them: they may be wider then
+LatticeAxis lattice_axis(int axes, bool bent);
 
 /// A lattice over some of a machine's scores.
 struct ScoreLattice {

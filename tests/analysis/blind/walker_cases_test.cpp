@@ -135,7 +135,7 @@ TEST(WalkerCases, SizesReachThePowerAskedForAndTheSameSeedGivesTheSameBytes) {
   EXPECT_NEAR(made.truth.power, 64, 32);
   EXPECT_EQ(made.truth.effects.front().id, "hip_damping");
   const Walks walks = *parse_walks(source_of(*made.walks, "case"));
-  EXPECT_GE(walks.runs.trials.size(), 60u);
+  EXPECT_GE(walks.runs.trials.size(), 25u);
   EXPECT_EQ(made.walks->experiment_toml.find("damping"), std::string::npos);
   complete_walker_truth(made);
   EXPECT_GT(made.truth.left, 9);
