@@ -121,7 +121,7 @@ std::vector<double> bounded_survival_after(const Chain& chain, std::span<const d
   const double most = std::max(most_followed, anyhow);
   double last = 0;
   for (const double n : steps)
-    if (std::isfinite(n)) last = std::max(last, std::floor(n));
+    if (std::isfinite(n)) last = std::max(last, n);
   std::unique_ptr<Settled> settled;
   if (last > anyhow) settled = std::make_unique<Settled>(chain, quasi());
   Survivors survivors(chain, start);
@@ -137,11 +137,11 @@ std::vector<double> bounded_survival_after(const Chain& chain, std::span<const d
   }
   std::vector<double> told;
   for (const double n : steps) {
-    const double whole = std::floor(n), beyond = whole - static_cast<double>(at.size() - 1);
+    const double beyond = n - static_cast<double>(at.size() - 1);
     if (std::isinf(n))
       told.push_back(never(chain, start, heard));
     else if (beyond <= 0)
-      told.push_back(at[static_cast<std::size_t>(whole)]);
+      told.push_back(at[static_cast<std::size_t>(n)]);
     else
       told.push_back(survivors.any() ? static_cast<double>(std::exp(survivors.log_survival() +
                                                                     settled->log_survival(survivors.shares(), beyond)))

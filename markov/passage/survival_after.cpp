@@ -126,7 +126,8 @@ void check_survival(const Chain& chain, std::span<const double> start, std::span
   if (!(std::abs(sum_of(start) - 1) <= start_tolerance))
     throw std::invalid_argument(fmt::format("start: probabilities sum to {:.12g}, 1 expected", sum_of(start)));
   for (const double n : steps)
-    if (!(n >= 0)) throw std::invalid_argument(fmt::format("steps: {} is below 0", n));
+    if (!(n >= 0 && n == std::floor(n)))
+      throw std::invalid_argument(fmt::format("steps: {} is no whole number from 0 on, nor infinity", n));
 }
 
 std::vector<double> survival_after(const Chain& chain, std::span<const double> start, std::span<const double> steps,
@@ -138,10 +139,10 @@ std::vector<double> survival_after(const Chain& chain, std::span<const double> s
   std::vector<double> far, at(steps.size());
   double last = 0;
   for (const double n : steps)
-    if (n <= most) last = std::max(last, std::floor(n));
+    if (n <= most) last = std::max(last, n);
   const std::vector<double> near = followed(chain, start, static_cast<std::size_t>(last));
   for (const double n : steps)
-    if (n > most && std::isfinite(n)) far.push_back(std::floor(n));
+    if (n > most && std::isfinite(n)) far.push_back(n);
   std::vector<double> beyond;
   if (!far.empty() && doubles) {
     beyond = doubled(chain, start, far);

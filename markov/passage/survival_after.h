@@ -16,7 +16,7 @@ void check_survival(const Chain& chain, std::span<const double> start, std::span
 /// throughout, O(states^3) a doubling. On more than 512 states as many as take 2e8 products are followed, further ones
 /// by Survival.
 /// @param start  size n, >= 0, sums to one
-/// @param steps  >= 0, fractions cut; infinity: that of never coming to rest
+/// @param steps  whole numbers >= 0; infinity: that of never coming to rest
 /// @throws std::invalid_argument for other arguments (interpolated chains too); std::domain_error and ConvergenceError
 /// as Survival and ChainSolver, for that many steps on so many states alone
 std::vector<double> survival_after(const Chain& chain, std::span<const double> start, std::span<const double> steps,

@@ -815,10 +815,13 @@ class Chain:
             return Passage(**self._held.committor(self._marks(states), tell))
 
     def survival(self, start, steps, *, progress=None):
-        """P(no failure within n steps) for each n of `steps` (infinity: ever), from a distribution `start` over the
-        states (or the index of one)."""
+        """P(no failure within n steps) for each n of `steps`, whole numbers (infinity: ever), from a distribution `start`
+        over the states (or the index of one)."""
         if numpy.ndim(start) == 0:
-            start = self._marks([start])
+            index = numpy.asarray(start)[()]
+            if not isinstance(index, numbers.Integral) or not 0 <= index < len(self):
+                raise InputError(f"start: {index} is no distribution over the states, nor an index from 0 to {len(self) - 1}")
+            start = self._marks([index])
         with _progress.telling(progress, "survival") as tell:
             return self._held.survival(_numbers(start, "start"), _numbers(numpy.atleast_1d(steps), "steps"), tell)
 

@@ -67,8 +67,9 @@ TEST(SurvivalAfter, IllegalInputs) {
   EXPECT_EQ(message({1}, {1}), "start: 1 probabilities given for 2 states");
   EXPECT_EQ(message({0.5, 0.4}, {1}), "start: probabilities sum to 0.9, 1 expected");
   EXPECT_EQ(message({1.5, -0.5}, {1}), "start: -0.5 for state 1 is below 0");
-  EXPECT_EQ(message({1, 0}, {-1}), "steps: -1 is below 0");
-  EXPECT_EQ(message({1, 0}, {std::nan("")}), "steps: nan is below 0");
+  EXPECT_EQ(message({1, 0}, {-1}), "steps: -1 is no whole number from 0 on, nor infinity");
+  EXPECT_EQ(message({1, 0}, {1.5}), "steps: 1.5 is no whole number from 0 on, nor infinity");
+  EXPECT_EQ(message({1, 0}, {std::nan("")}), "steps: nan is no whole number from 0 on, nor infinity");
 }
 
 }  // namespace

@@ -178,8 +178,16 @@ class Chains(unittest.TestCase):
         for ask, sentence in ((lambda: chain.committor([2]), "states: 2 is not one of 0 to 1"),
                               (lambda: chain.committor([-1]), "states: -1 is not one of 0 to 1"),
                               (lambda: chain.committor([.5]), "states: a list of indices or 2 booleans"),
-                              (lambda: chain.survival(2, [1]), "states: 2 is not one of 0 to 1"),
-                              (lambda: chain.survival([1, 0], [-1]), "steps: -1 is below 0"),
+                              (lambda: chain.survival(2, [1]), "^start: 2 is no distribution over the states, nor an "
+                                                               "index from 0 to 1$"),
+                              (lambda: chain.survival(-1, [1]), "^start: -1 is no distribution"),
+                              (lambda: chain.survival(.5, [1]), "^start: 0.5 is no distribution"),
+                              (lambda: chain.survival(None, [1]), "^start: None is no distribution"),
+                              (lambda: chain.survival(True, [1]), "^start: True is no distribution"),
+                              (lambda: chain.survival([1, 0], [-1]), "^steps: -1 is no whole number from 0 on, nor "
+                                                                     "infinity$"),
+                              (lambda: chain.survival(0, [1.5]), "^steps: 1.5 is no whole number"),
+                              (lambda: chain.survival(0, [np.nan]), "^steps: nan is no whole number"),
                               (lambda: chain.survival([1, 0], [1j]), "steps: real numbers expected"),
                               (lambda: chain.survival([.5, 0], [1]), "start: probabilities sum to 0.5, 1 expected")):
             with self.assertRaisesRegex(metastable.InputError, sentence):
