@@ -226,6 +226,10 @@ void CsvReader::refuse(std::size_t column, std::string_view what) {
   report(has(column) ? fields_[*position_[column]].offset : begin_, fmt::format("{}: {}", columns_[column].name, what));
 }
 
+std::string CsvReader::remedy(std::size_t column) const {
+  return columns_[column].remedy.empty() ? "" : fmt::format("; {}", columns_[column].remedy);
+}
+
 bool CsvReader::read(std::size_t column, const dynamics::Range& range, std::optional<double>& value) {
   value.reset();
   const std::string_view field = text(column);
@@ -235,7 +239,7 @@ bool CsvReader::read(std::size_t column, const dynamics::Range& range, std::opti
   }
   double number = 0;
   if (!parse(field, number)) {
-    refuse(column, fmt::format("{} is not a finite number", shown_text(field)));
+    refuse(column, fmt::format("{} is not a finite number{}", shown_text(field), remedy(column)));
     return false;
   }
   if (!range.holds(number)) {
@@ -261,7 +265,7 @@ bool CsvReader::read(std::size_t column, std::int64_t least, std::int64_t most, 
     good = true;
   }
   if (!good) {
-    refuse(column, fmt::format("{} is not a whole number in {}..{}", shown_text(field), least, most));
+    refuse(column, fmt::format("{} is not a whole number in {}..{}{}", shown_text(field), least, most, remedy(column)));
     return false;
   }
   if (whole < least || whole > most) {

@@ -17,7 +17,8 @@ namespace metastable::analysis {
 /// Describes a column that a file may or must have.
 struct CsvColumn {
   std::string_view name;
-  bool required = false;  ///< must be in the header, and filled in every row
+  bool required = false;         ///< must be in the header, and filled in every row
+  std::string_view remedy = {};  ///< behind what is refused as no number: how to write it
 };
 
 /// Says how a file differs from the CSV of an experiment folder.
@@ -79,6 +80,7 @@ class CsvReader {
   void read_units();
   bool fits();  // has the record as many fields as the header, or is made to
   bool parse(std::string_view text, double& value) const;
+  std::string remedy(std::size_t column) const;
   void skip_line();
   TextPosition place(std::size_t offset) const;
   void report(std::size_t offset, std::string_view what) { defects_.add(file_, place(offset), what); }

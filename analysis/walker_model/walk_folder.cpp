@@ -27,6 +27,7 @@ namespace {
 constexpr double angle_error = 0.0005, compass_rate_error = 0.005, simplest_rate_error = 0.001;
 constexpr double unknown_launch = 0.3;  // sd of a first value that is not measured, in those of the gait
 constexpr std::int64_t most_steps = 1'000'000'000;
+constexpr std::string_view phase_remedy = "write 1 where leg 1 stands and 2 where leg 2 does";
 constexpr dynamics::Range angles{.low = 0, .high = 1.5707963267948966, .low_open = true, .high_open = true};
 constexpr dynamics::Range rates{.low = -30, .high = 30};  // [rad/s]: ten times what gaits have; degrees are beyond
 
@@ -44,8 +45,8 @@ class WalkReader {
     runs_.conditions.clear();
     const std::string file = file_in(source_, "steps.csv");
     if (!source_.steps_csv) return defects_.add(file, {}, "there is no such file; walks need it");
-    std::vector<CsvColumn> columns{{"condition"}, {"trial", true}, {"step", true},
-                                   {"phase"},     {"time_s"},      {"position_m"}};
+    std::vector<CsvColumn> columns{{"condition"}, {"trial", true}, {"step", true}, {"phase", false, phase_remedy},
+                                   {"time_s"},    {"position_m"}};
     for (const MachineSensor& sensor : machine_.observe) columns.push_back({sensor.state});
     CsvReader csv(file, *source_.steps_csv, columns, defects_);
     for (const MachineSensor& sensor : machine_.observe)

@@ -85,6 +85,25 @@ void check_roles(const std::vector<MappedColumn>& map) {
   if (column_of(map, Role::time) == nullptr) throw std::invalid_argument("--columns: angle needs time");
 }
 
+// Returns the experiment.toml of the walker that the options state.
+std::string walker_description(const ImportRequest& request, const std::vector<ImportedRow>& rows,
+                               const std::vector<std::string>& comment) {
+  analysis::WalkStatement told{request.title, {*request.walker}, {}, comment};
+  for (const Role role : {Role::half_angle, Role::stance_rate, Role::swing_rate}) {
+    const bool has = std::ranges::any_of(rows, [&](const auto& row) { return (row.*value_member(role)).has_value(); });
+    const auto error = std::ranges::find(request.errors, role, &std::pair<Role, double>::first);
+    if (!has && error != request.errors.end())
+      throw std::invalid_argument(fmt::format("--errors: {}: {} holds no value of it", role_name(role), request.file));
+    if (!has) continue;
+    if (role == Role::swing_rate && request.walker->walker == analysis::Walker::simplest)
+      throw std::invalid_argument(
+          "--columns: swing_rate: the simplest walker is told by half_angle and stance_rate; leave it out");
+    told.columns.emplace_back(std::string(column_in_folder(role)),
+                              error == request.errors.end() ? std::nullopt : std::optional(error->second));
+  }
+  return analysis::walk_toml(told);
+}
+
 std::string description_of(const ImportRequest& request, const std::vector<ImportedRow>& rows,
                            const std::vector<std::string>& comment) {
   if (!request.description.empty()) {
@@ -92,17 +111,7 @@ std::string description_of(const ImportRequest& request, const std::vector<Impor
     for (const std::string& line : comment) text += "# " + line + "\n";
     return text + read_file(request.description);
   }
-  if (request.walker) {
-    analysis::WalkStatement told{request.title, {*request.walker}, {}, comment};
-    for (const Role role : {Role::half_angle, Role::stance_rate, Role::swing_rate}) {
-      if (std::ranges::none_of(rows, [&](const ImportedRow& row) { return (row.*value_member(role)).has_value(); }))
-        continue;
-      const auto error = std::ranges::find(request.errors, role, &std::pair<Role, double>::first);
-      told.columns.emplace_back(std::string(column_in_folder(role)),
-                                error == request.errors.end() ? std::nullopt : std::optional(error->second));
-    }
-    return analysis::walk_toml(told);
-  }
+  if (request.walker) return walker_description(request, rows, comment);
   std::vector<std::pair<std::string, double>> slopes = request.slopes;
   if (slopes.empty()) {
     for (const ImportedRow& row : rows)

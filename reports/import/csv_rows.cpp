@@ -7,6 +7,14 @@
 namespace metastable::reports {
 namespace {
 
+// Says what to write where a column of this role holds letters.
+std::string_view remedy_of(Role role) {
+  if (role == Role::phase)
+    return "phases are numbers: write 1 where leg 1 stands and 2 where leg 2 does (or 0 and 1, and --legs-from 0)";
+  if (role == Role::leg) return "legs are numbers: count them from 0 (or from 1, and --legs-from 1)";
+  return {};
+}
+
 class CsvRows {
  public:
   CsvRows(const std::string& file, analysis::CsvReader& csv, const std::vector<MappedColumn>& map)
@@ -66,6 +74,8 @@ std::vector<ImportedRow> csv_rows(const std::string& file, std::string_view text
   const std::vector<analysis::CsvColumn> columns = [&] {
     std::vector<analysis::CsvColumn> all;
     for (const std::string& name : names) all.push_back({name});
+    for (const MappedColumn& column : map)
+      for (const std::size_t at : column.columns) all[at].remedy = remedy_of(column.role);
     return all;
   }();
   const MappedColumn* main = main_column(map);

@@ -91,6 +91,8 @@ TEST_F(WalkFolder, WhatIsWrongIsNamedWithItsPlace) {
   has(with(&WalkFiles::steps_csv, ",0.27", ",15.5"), "half_angle_rad: 15.5");
   has(with(&WalkFiles::steps_csv, "1,2,2,", "1,3,2,"), "step: 3 is not due: step 2 of trial 1 is");
   has(with(&WalkFiles::steps_csv, "1,2,2,", "1,2,3,"), "phase: 3 is outside 1..2");
+  has(with(&WalkFiles::steps_csv, "1,2,2,", "1,2,R,"),
+      "phase: 'R' is not a whole number in 1..2; write 1 where leg 1 stands and 2 where leg 2 does");
   has(with(&WalkFiles::steps_csv, "swing_rate_rad_s", "swing"), "swing");
   has(with(&WalkFiles::trials_csv, "stopped", "halted"), "'halted' is none of failed, stopped, lost");
   has(with(&WalkFiles::trials_csv, "\n6,", "\n7,"), "steps.csv has no trial 7");

@@ -78,8 +78,21 @@ TEST_F(Import, NamesWhatWalksLack) {
                  "condition, trial, time, position, outcome, step, phase, half_angle, stance_rate, swing_rate");
   expect_refused(walks({"--slope-sd", "0.3", "--columns", "trial=run,phase=foot,half_angle=theta[deg]"}),
                  csv + ":2: phase: 0 is outside 1..2");
+  const std::string letters = file("letters.csv", "run,foot,theta\n1,L,15\n1,2,14\n");
+  expect_refused(
+      import({letters, "--walker", "compass", "--slope", "3", "--slope-sd", "0.3", "--columns",
+              "trial=run,phase=foot,half_angle=theta[deg]"}),
+      letters +
+          ":2:3: foot: 'L' is not a finite number; phases are numbers: write 1 where leg 1 stands and 2 where leg 2 "
+          "does (or 0 and 1, and --legs-from 0)");
   expect_refused(walks({"--slope-sd", "0.3", "--errors", "theta=1"}),
                  "--errors: 'theta' is none of half_angle, stance_rate, swing_rate");
+  expect_refused(walks({"--slope-sd", "0.3", "--columns", "trial=run,half_angle=theta[deg]", "--errors",
+                        "half_angle=0.001,swing_rate=0.1"}),
+                 "--errors: swing_rate: " + csv + " holds no value of it");
+  expect_refused(import({file("rates.csv", "run,a,b\n1,0.27,-1\n"), "--walker", "simplest", "--slope", "0.5",
+                         "--slope-sd", "0.05", "--columns", "trial=run,half_angle=a[rad],swing_rate=b[rad/s]"}),
+                 "--columns: swing_rate: the simplest walker is told by half_angle and stance_rate; leave it out");
   expect_refused(import({csv, "--slope", "3", "--slope-sd", "0.3"}), "--slope-sd: has a meaning with --walker only");
 }
 
