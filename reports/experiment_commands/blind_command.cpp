@@ -269,7 +269,9 @@ std::vector<analysis::BlindTruth> unsealed(const Places& places, const std::vect
   for (const int number : numbers) {
     const fs::path path = places.truth(number);
     const std::optional<std::string> text = file_text(path);
-    if (!text) throw OutputError(path, "there is no such sealed truth");
+    if (!text)
+      throw std::invalid_argument(
+          fmt::format("{}: there is no such file; it holds the sealed truth of case {}", path.string(), number));
     if (sha256(*text) != trimmed(file_text(places.case_folder(number) / "seal.txt").value_or("")))
       throw std::invalid_argument(fmt::format("{}: the seal of case {} is broken", path.string(), number));
     truths.push_back(read_truth(path.string(), *text));
@@ -322,6 +324,37 @@ Reached reached_cases(const Places& places, const std::vector<analysis::BlindTru
     reached.answers.push_back(answered ? std::optional(given.at(truth.number)) : std::nullopt);
   }
   return reached;
+}
+
+// Names cases, runs of them by their ends: "0001, 0004 to 0009".
+std::string names_of(const std::vector<int>& numbers) {
+  std::string names;
+  for (std::size_t first = 0, next; first < numbers.size(); first = next) {
+    for (next = first + 1; next < numbers.size() && numbers[next] == numbers[next - 1] + 1;) ++next;
+    names += (first > 0 ? ", " : "") + name_of(numbers[first]);
+    if (next - first > 1) names += (next - first > 2 ? " to " : ", ") + name_of(numbers[next - 1]);
+  }
+  return names;
+}
+
+// Refuses to open a run of which the answers to some cases are missing, or to all. @param answered  how many are
+// recorded  @param reached  those and what the tool failed on
+void require_answers(const BlindRequest& request, const Places& places, std::size_t answered,
+                     const std::vector<analysis::BlindTruth>& reached, std::size_t planned) {
+  std::vector<int> missing;
+  for (int number = 1; static_cast<std::size_t>(number) <= planned; ++number)
+    if (std::ranges::find(reached, number, &analysis::BlindTruth::number) == reached.end()) missing.push_back(number);
+  const std::vector<int> unmade = missing_cases(places, planned);
+  if (missing.empty() && answered == 0)
+    throw std::invalid_argument(
+        fmt::format("{}: the diagnosis failed on every case; see {}/*.err", request.folder, places.answers.string()));
+  if (!missing.empty())
+    throw std::invalid_argument(
+        fmt::format("{}: no answer to {} of {} cases ({}), and opening the truths ends the run: answer {} first "
+                    "({}`blind answer`){}",
+                    request.folder, missing.size(), planned, names_of(missing), missing.size() == 1 ? "it" : "them",
+                    unmade.empty() ? "" : fmt::format("`blind make` for {}, then ", names_of(unmade)),
+                    answered == 0 ? "" : ", or give --partial to grade the others alone"));
 }
 
 void complete_truths(const Places& places, std::vector<analysis::BlindTruth>& truths, int threads) {
@@ -417,14 +450,9 @@ BlindOpened open_blind(const BlindRequest& request, Unanswered unanswered) {
   const std::optional<FileLock> alone =
       fs::is_directory(places.answers) ? std::optional(lock_answers(places)) : std::nullopt;
   const std::vector<RecordedAnswer> record = checked_record(places);
-  if (record.empty()) throw OutputError(places.record, "no case is answered; `blind answer` does that");
   Reached reached = reached_cases(places, truths, recorded_answers(places, record));
-  const std::size_t planned = planned_cases(places, numbers.size());
-  if (reached.truths.size() < planned && unanswered == Unanswered::refused && !fs::exists(places.marker))
-    throw std::invalid_argument(fmt::format(
-        "{}: {} of {} cases are answered, and opening the truths ends the run: answer the others first "
-        "(`blind make` where they are not made yet, `blind answer`), or give --partial to grade these alone",
-        request.folder, reached.truths.size(), planned));
+  if (record.empty() || (unanswered == Unanswered::refused && !fs::exists(places.marker)))
+    require_answers(request, places, record.size(), reached.truths, planned_cases(places, numbers.size()));
   close_record(places, record);
   complete_truths(places, reached.truths, request.threads);
 

@@ -127,7 +127,11 @@ TEST(BlindTables, AFewCasesMeetNoBound) {
 
 TEST_F(BlindRun, RefusesChangedTruthsAndAnswersAndLateOnes) {
   run_blind_make(request_);
-  EXPECT_NE(message_of([&] { run_blind_open(request_); }).find("no case is answered"), std::string::npos);
+  for (const Unanswered unanswered : {Unanswered::refused, Unanswered::left_out})
+    EXPECT_EQ(message_of([&] { run_blind_open(request_, unanswered); }),
+              request_.folder +
+                  ": no answer to 3 of 3 cases (0001 to 0003), and opening the truths ends the run: answer "
+                  "them first (`blind answer`)");
   run_blind_answer(request_);
 
   const fs::path answer = fs::path(request_.folder) / "answers" / "0001.json";
@@ -150,8 +154,8 @@ TEST_F(BlindRun, RefusesChangedTruthsAndAnswersAndLateOnes) {
   write(record, all.substr(0, all.rfind('\n', all.size() - 2) + 1));
   EXPECT_EQ(message_of([&] { run_blind_open(request_); }),
             request_.folder +
-                ": 2 of 3 cases are answered, and opening the truths ends the run: answer the others first "
-                "(`blind make` where they are not made yet, `blind answer`), or give --partial to grade these alone");
+                ": no answer to 1 of 3 cases (0003), and opening the truths ends the run: answer it first "
+                "(`blind answer`), or give --partial to grade the others alone");
   EXPECT_FALSE(fs::exists(request_.folder + "-sealed/opened.csv"));
   run_blind_open(request_, Unanswered::left_out);
   EXPECT_NE(message_of([&] { run_blind_answer(request_); }).find("was opened"), std::string::npos);
@@ -165,7 +169,10 @@ TEST_F(BlindRun, CasesNotMadeYetAreMissed) {
   run_blind_make(request_);
   fs::remove_all(fs::path(request_.folder) / "cases" / "0003");
   run_blind_answer(request_);
-  EXPECT_NE(message_of([&] { run_blind_open(request_); }).find("2 of 3 cases are answered"), std::string::npos);
+  EXPECT_NE(message_of([&] { run_blind_open(request_); })
+                .find("no answer to 1 of 3 cases (0003), and opening the truths ends the run: answer it first (`blind "
+                      "make` for 0003, then `blind answer`)"),
+            std::string::npos);
   run_blind_make(request_);
   run_blind_answer(request_);
   run_blind_open(request_);
@@ -187,9 +194,17 @@ TEST_F(BlindRun, CountsWhatTheToolFailedOn) {
   run_blind_answer(request_);
   EXPECT_EQ(read(answers / "0002.json.err"), "no\nexit code 3\n");
   write(answers / "0002.json.err", "");  // as a killed one leaves it
-  EXPECT_NE(message_of([&] { run_blind_open(request_); }).find("2 of 3 cases are answered"), std::string::npos);
+  EXPECT_NE(message_of([&] { run_blind_open(request_); }).find("no answer to 1 of 3 cases (0002)"), std::string::npos);
   run_blind_answer(request_);
   run_blind_open(request_);
+}
+
+TEST_F(BlindRun, SaysThatTheToolFailedOnEveryCase) {
+  run_blind_make(request_);
+  request_.tool = {"/bin/false"};
+  run_blind_answer(request_);
+  EXPECT_EQ(message_of([&] { run_blind_open(request_); }),
+            request_.folder + ": the diagnosis failed on every case; see " + request_.folder + "/answers/*.err");
 }
 
 TEST_F(BlindRun, KeepsTruthsApart) {
