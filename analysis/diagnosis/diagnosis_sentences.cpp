@@ -263,6 +263,13 @@ void say_what_is_hidden(std::vector<std::string>& s, const Diagnosis& d) {
   if (!too_few.empty()) s.push_back(fmt::format("Too few trials to say {}.", fmt::join(too_few, ", ")));
 }
 
+// Says out of what effects can be taken: errors of sensors, by their ids, are no part of the machine.
+std::string taken_out_of(const std::vector<std::string>& effects) {
+  const auto of_sensor = [](const std::string& id) { return id.starts_with("sensor_"); };
+  if (std::ranges::all_of(effects, of_sensor)) return "the measurement";
+  return std::ranges::any_of(effects, of_sensor) ? "machine and measurement" : "the machine";
+}
+
 }  // namespace
 
 std::string common_name(const std::vector<EffectGroup>& groups, const std::vector<std::string>& alike) {
@@ -295,24 +302,28 @@ std::string next_step(const Diagnosis& d) {
     case Verdict::explained:
       if (d.causes.set.size() == 1)
         return fmt::format(
-            "Give the model {} with the parameters under “Which effect”, or take it out of the machine; "
+            "Give the model {} with the parameters under “Which effect”, or take it out of {}; "
             "new trials should then leave no gap.",
-            d.causes.set.front());
+            d.causes.set.front(), taken_out_of(parts_of(d.causes.set.front())));
       if (!d.limits.next.empty())
         return fmt::format(
             "Tell the causes apart before changing the model: {} would do it best (“The next "
             "experiment”).",
             d.limits.next.front().change);
-      return "Tell the causes apart before changing the model: with more trials, or with a column under “What missing "
-             "columns hide”.";
+      return fmt::format("Tell the causes apart before changing the model: with more trials{}.",
+                         d.limits.missing.empty() ? "" : ", or with a column under “What missing columns hide”");
     case Verdict::partly_explained: {
-      std::vector<std::string> names;
+      std::vector<std::string> names, effects;
       for (const AtWork& one : d.causes.at_work)
-        if (one.probability >= d.rules.least_at_work) names.push_back(one.name);
+        if (one.probability >= d.rules.least_at_work) {
+          names.push_back(one.name);
+          effects.insert(effects.end(), one.effects.begin(), one.effects.end());
+        }
       return fmt::format(
-          "Give the model {}, or take {} out of the machine, and diagnose new trials: what stays is then the whole gap "
-          "and shows more clearly.",
-          fmt::join(names, " and "), names.size() == 1 ? "it" : "them");
+          "Give the model {}, or take {} out of {}, and diagnose new trials: what stays is then the whole gap and "
+          "shows "
+          "more clearly.",
+          fmt::join(names, " and "), names.size() == 1 ? "it" : "them", taken_out_of(effects));
     }
     case Verdict::unexplained:
       if (const auto would_do = trials_to_explain(d.data))

@@ -222,6 +222,20 @@ TEST(DiagnosisText, EveryVerdictSaysWhatToDoNext) {
   };
   d.causes.set = {"leg_contact"};
   EXPECT_NE(next().find("Give the model leg_contact"), std::string::npos) << next();
+  EXPECT_NE(next().find("take it out of the machine;"), std::string::npos) << next();
+  d.causes.set = {"sensor_bias_half_angle_rad"};
+  EXPECT_NE(next().find("take it out of the measurement;"), std::string::npos) << next();
+  d.causes.set = {"hip_damping", "sensor_noise_half_angle_rad"};
+  EXPECT_NE(next().find("slopes flatter by 2 deg would do it best"), std::string::npos) << next();
+  d.limits.next.clear();
+  d.limits.missing.clear();
+  EXPECT_EQ(next(), "Tell the causes apart before changing the model: with more trials.");
+  d.verdict = analysis::Verdict::partly_explained;
+  for (const char* id : {"hip_damping", "sensor_noise_half_angle_rad"}) {
+    analysis::AtWork& one = d.causes.at_work.emplace_back();
+    one.name = id, one.effects = {id}, one.probability = 1;
+  }
+  EXPECT_NE(next().find("take them out of machine and measurement,"), std::string::npos) << next();
   d.verdict = analysis::Verdict::no_gap;
   EXPECT_NE(next().find("Use the model as it is"), std::string::npos) << next();
   d.verdict = analysis::Verdict::recalibrate;
