@@ -17,6 +17,7 @@
 #include "analysis/machine_model/machine_transitions.h"
 #include "analysis/statistics/random.h"
 #include "analysis/walkers/walker_study.h"
+#include "dynamics/catalogue/walker_effects.h"
 #include "dynamics/numerics/truncated_normal.h"
 #include "dynamics/walkers/gait.h"
 #include "markov/parallel.h"
@@ -183,6 +184,14 @@ class WalkDrawer {
   double rate_error_;
 };
 
+// Returns the walker that is drawn.
+WalkerStatement drawn_walker(const WalkerSetting& setting) {
+  WalkerStatement statement;
+  statement.setting = setting;
+  statement.legs = setting.walker == Walker::compass;
+  return statement;
+}
+
 // Returns the machine's values with those of the effects.
 std::vector<double> values_with(const Machine& machine, const std::vector<std::pair<std::string, double>>& effects) {
   std::vector<double> values;
@@ -290,11 +299,33 @@ std::string walk_toml(const WalkStatement& statement) {
   return text;
 }
 
+std::vector<std::pair<std::string, double>> effects_of_walks(WalkerSetting setting,
+                                                             const std::vector<std::string>& texts) {
+  setting.terrain = dynamics::Terrain::fresh;
+  const std::vector<MachineEffect> effects = walker_machine(drawn_walker(setting)).effects;
+  std::vector<std::string> known;
+  for (const MachineEffect& effect : effects) known.push_back(effect.id);
+  std::vector<std::pair<std::string, double>> values;
+  for (const std::string& text : texts) {
+    const std::string id = text.substr(0, text.find(':'));
+    require_word("--effect", id, known);
+    const MachineEffect& effect = *std::ranges::find(effects, id, &MachineEffect::id);
+    dynamics::EffectInfo info = dynamics::walker_effect_info(id);
+    for (std::size_t p = 0; p < effect.parameters.size(); ++p) {
+      info.parameters[p].lower = effect.parameters[p].lower;
+      info.parameters[p].upper = effect.parameters[p].upper;
+      if (setting.walker == Walker::simplest) info.parameters[p].unit.clear();  // it has units of its own
+    }
+    const dynamics::Effect read = dynamics::effect_from_text(text, {}, info);
+    for (std::size_t p = 0; p < effect.parameters.size(); ++p)
+      values.emplace_back(id + "." + effect.parameters[p].name, read.values[p]);
+  }
+  return values;
+}
+
 WalkFiles draw_walks(const WalkerSetting& setting, const std::vector<std::pair<std::string, double>>& effects,
                      const WalkOptions& options, const std::string& title) {
-  WalkerStatement statement;
-  statement.setting = setting;
-  statement.legs = setting.walker == Walker::compass;
+  const WalkerStatement statement = drawn_walker(setting);
   const Machine machine = walker_machine(statement);
   const double rate_error = statement.legs ? compass_rate_error : simplest_rate_error;
   const std::vector<double> start =

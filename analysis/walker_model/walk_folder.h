@@ -60,6 +60,11 @@ std::string walk_toml(const WalkStatement& statement);
 /// Returns the texts as a folder of that name holds them.
 ExperimentSource source_of(const WalkFiles& files, const std::string& name);
 
+/// Reads effects of a walker that walks are drawn from, "hip_damping:damping=0.3", as draw_walks() takes them.
+/// @throws std::invalid_argument as dynamics::effect_from_text(), and for an id that the machine does not have
+std::vector<std::pair<std::string, double>> effects_of_walks(WalkerSetting setting,
+                                                             const std::vector<std::string>& texts);
+
 /// Draws walks of a walker with effects, as WalkOptions says, which start in the gait of the ideal one, and measures
 /// them with errors of 0.0005 rad and, for the rates, 0.005 rad/s (simplest: 0.001). A row is a state just after a
 /// strike; what becomes of the last row of WalkOptions::longest is not told.

@@ -48,16 +48,16 @@ std::vector<EffectInfo> make_catalogue() {
          .lower = 0,
          .upper = 63,
          .meaning = "the leg, from 0",
-         .integer = true},
+         .integer = true,
+         .place = true},
         effect_parameter("friction_ratio", "", 1, 0.1, 5, "multiplies mu when that leg lands"),
         effect_parameter("restitution_ratio", "", 1, 0, 3, "multiplies eta when that leg lands (at most 1)")}},
       {"hub_eccentricity",
        "the centre of mass lies off the geometric centre",
        {effect_parameter("offset_m", "m", 0, 0, 0.05,
                          "distance of the centre of mass from the geometric centre, in stance, inertia and contact"),
-        effect_parameter(
-            "phase_rad", "rad", 0, -full_turn, full_turn,
-            "its direction, from leg 0 the way the landing legs follow each other (leg k lies at k alpha)")}},
+        effect_place("phase_rad", "rad", 0, -full_turn, full_turn,
+                     "its direction, from leg 0 the way the landing legs follow each other (leg k lies at k alpha)")}},
       {"inertia",
        "the inertia differs",
        {effect_parameter("ratio", "", 1, 0.5, 2,
@@ -70,8 +70,8 @@ std::vector<EffectInfo> make_catalogue() {
        {effect_parameter(
             "sag_m", "m", 0, -0.1, 0.1,
             "depth by which a parabola sags below its chord in the middle of the stretch; negative: bows up"),
-        effect_parameter("from_m", "m", 0, 0, 100, "start of the stretch, down the ramp from foot 1"),
-        effect_parameter("to_m", "m", 0, 0, 100, stretch_end)}},
+        effect_place("from_m", "m", 0, 0, 100, "start of the stretch, down the ramp from foot 1"),
+        effect_place("to_m", "m", 0, 0, 100, stretch_end)}},
       {"axle_drag_viscous",
        "a resisting torque proportional to the speed",
        {effect_parameter("n_m_s", "N m s", 0, 0, 10, "b in the torque b omega during stance")}},
@@ -87,7 +87,7 @@ std::vector<EffectInfo> make_catalogue() {
       {"speed_dependent_friction",
        "friction falls from a static to a kinetic value with the speed",
        {effect_parameter("amplitude", "", 0, -0.9, 5, "a in mu (1 + a exp(-omega / speed_rad_s))"),
-        effect_parameter("speed_rad_s", "rad/s", 5, 0.1, 50, "the speed on which it falls")}},
+        effect_place("speed_rad_s", "rad/s", 5, 0.1, 50, "the speed on which it falls")}},
       {"contact_memory",
        "successive collisions of a trial are correlated",
        {effect_parameter(
@@ -95,8 +95,8 @@ std::vector<EffectInfo> make_catalogue() {
            "of successive normal scores of eta, and of mu, within a trial (first-order autoregression)")}},
       {"friction_patch",
        "friction differs over an interval of the ramp",
-       {effect_parameter("from_m", "m", 0, 0, 100, "start of the interval, down the ramp from foot 1"),
-        effect_parameter("to_m", "m", 0, 0, 100, "end of the interval; 0: the ramp's end"),
+       {effect_place("from_m", "m", 0, 0, 100, "start of the interval, down the ramp from foot 1"),
+        effect_place("to_m", "m", 0, 0, 100, "end of the interval; 0: the ramp's end"),
         effect_parameter("friction_ratio", "", 1, 0.1, 5, "multiplies mu of feet that land in the interval")}},
       {"trial_drift",
        "friction drifts over the trials (wear, static charge)",
@@ -109,7 +109,8 @@ std::vector<EffectInfo> make_catalogue() {
       {"contact_outliers",
        "rare collisions with much larger losses (grit)",
        {effect_parameter("share", "", 0, 0, 0.5, "probability of a collision to be one"),
-        effect_parameter("friction_ratio", "", 1, 0.1, 10, "multiplies mu of such a collision")}},
+        effect_parameter("friction_ratio", "", 1, 0.1, 10, "multiplies mu of such a collision")},
+       true},
       {"sensor_noise",
        "white noise on the reported speeds, beyond the stated one",
        {effect_parameter("sd_rad_s", "rad/s", 0, 0, 2, "its standard deviation, independent at every reported speed")}},
@@ -121,7 +122,7 @@ std::vector<EffectInfo> make_catalogue() {
        "the rebound's energy, or a share of it, is lost in hops, above a speed at which feet begin to hop",
        {effect_parameter("rebound_lost", "", 0, 0, 1,
                          "share of the kinetic energy given back by restitution at the foot that is lost as well"),
-        effect_parameter("onset_rad_s", "rad/s", 0, 0, 50, "collisions of lower omega- do not hop; 0: all do")}},
+        effect_place("onset_rad_s", "rad/s", 0, 0, 50, "collisions of lower omega- do not hop; 0: all do")}},
       {"soft_contact",
        "the tips of legs are soft: the wheel turns on while one is pressed; law settled",
        {effect_parameter("compliance_m_n", "m/N", 0, 0, 1e-5,
@@ -130,8 +131,7 @@ std::vector<EffectInfo> make_catalogue() {
        "the ramp rings: a loss depends on the time since the previous collision",
        {effect_parameter("amplitude", "", 0, 0, 1,
                          "A in the factor 1 + A cos(2 pi f dt) on a collision's loss; first collision of a trial: 1"),
-        effect_parameter("frequency_hz", "Hz", 10, 0.5, 60,
-                         "f in that factor; dt: time since the previous collision")}},
+        effect_place("frequency_hz", "Hz", 10, 0.5, 60, "f in that factor; dt: time since the previous collision")}},
       {"slip_reversal", "collisions obey `coulomb` with the wheel's radius of gyration", {}},
   };
   return all;
@@ -166,6 +166,29 @@ double number(std::string_view effect, std::string_view text) {
   return value;
 }
 
+// Refuses an effect of which no size is named: it would be silently without effect.
+void require_size(const EffectInfo& info, const std::map<std::string, std::vector<double>>& named,
+                  const NominalValues& nominal) {
+  std::vector<std::string> sizes, ranges, form;
+  bool all = true, any = false;
+  for (const EffectParameter& p : info.parameters) {
+    const bool counted = p.name == "leg" && !nominal.leg_lengths.empty();
+    const double upper = counted ? static_cast<double>(nominal.leg_lengths.size() - 1) : p.upper;
+    ranges.push_back(
+        fmt::format("{} in [{:.6g}, {:.6g}]{}{}", p.name, p.lower, upper, p.unit.empty() ? "" : " ", p.unit));
+    form.push_back(fmt::format("{}=VALUE{}", p.name, p.per_leg ? ";VALUE;..." : ""));
+    if (p.place) continue;
+    sizes.push_back(p.name);
+    any = any || named.contains(p.name);
+    all = all && named.contains(p.name);
+  }
+  if (sizes.empty() || (info.takes_all_sizes ? all : any)) return;
+  refuse(info.id, "",
+         fmt::format("does nothing without {}; it takes {}, written {}:{}",
+                     fmt::join(sizes, info.takes_all_sizes ? " and " : " or "), fmt::join(ranges, ", "), info.id,
+                     fmt::join(form, ",")));
+}
+
 std::vector<std::string_view> split(std::string_view text, char separator) {
   std::vector<std::string_view> parts;
   for (;;) {
@@ -186,6 +209,13 @@ EffectParameter effect_parameter(std::string name, std::string unit, std::option
           .lower = lower,
           .upper = upper,
           .meaning = std::move(meaning)};
+}
+
+EffectParameter effect_place(std::string name, std::string unit, std::optional<double> neutral, double lower,
+                             double upper, std::string meaning) {
+  EffectParameter one = effect_parameter(std::move(name), std::move(unit), neutral, lower, upper, std::move(meaning));
+  one.place = true;
+  return one;
 }
 
 const std::vector<EffectInfo>& effect_catalogue() {
@@ -241,10 +271,9 @@ Effect effect_from_values(const EffectInfo& info, const std::map<std::string, st
   return effect;
 }
 
-Effect effect_from_text(std::string_view text, const NominalValues& nominal,
-                        const EffectInfo& (*info_of)(std::string_view)) {
+Effect effect_from_text(std::string_view text, const NominalValues& nominal, const EffectInfo& info) {
   const auto colon = text.find(':');
-  const std::string_view id = text.substr(0, colon);
+  const std::string_view id = info.id;
   std::map<std::string, std::vector<double>> values;
   if (colon != std::string_view::npos)
     for (const std::string_view part : split(text.substr(colon + 1), ',')) {
@@ -256,7 +285,14 @@ Effect effect_from_text(std::string_view text, const NominalValues& nominal,
         throw std::invalid_argument(fmt::format("effect {}: {} is given twice", id, part.substr(0, equals)));
       for (const std::string_view one : split(part.substr(equals + 1), ';')) list.push_back(number(id, one));
     }
-  return effect_from_values(info_of(id), values, nominal);
+  Effect effect = effect_from_values(info, values, nominal);
+  require_size(info, values, nominal);
+  return effect;
+}
+
+Effect effect_from_text(std::string_view text, const NominalValues& nominal,
+                        const EffectInfo& (*info_of)(std::string_view)) {
+  return effect_from_text(text, nominal, info_of(text.substr(0, text.find(':'))));
 }
 
 std::string effect_text(const Effect& effect) {

@@ -19,17 +19,23 @@ struct EffectParameter {
   std::string meaning;
   bool integer = false;  ///< only whole numbers
   bool per_leg = false;  ///< a list, one value a leg
+  bool place = false;    ///< it says where, when or how fast, not how much: by itself it does nothing
 };
 
 /// Describes a number on a range. @param neutral  as EffectParameter's
 EffectParameter effect_parameter(std::string name, std::string unit, std::optional<double> neutral, double lower,
                                  double upper, std::string meaning);
 
+/// Describes a number that says where, when or how fast.
+EffectParameter effect_place(std::string name, std::string unit, std::optional<double> neutral, double lower,
+                             double upper, std::string meaning);
+
 /// Describes one effect. eta and mu stand for the restitution and friction drawn at a collision.
 struct EffectInfo {
   std::string id;
   std::string summary;
   std::vector<EffectParameter> parameters;
+  bool takes_all_sizes = false;  ///< of several sizes each alone does nothing
 };
 
 /// The one effect that is no missing physics: other contact parameters, which a recalibration refits.
@@ -62,11 +68,14 @@ Effect effect_from_values(std::string_view id, const std::map<std::string, std::
 Effect effect_from_values(const EffectInfo& info, const std::map<std::string, std::vector<double>>& values,
                           const NominalValues& nominal);
 
-/// Reads "leg_contact:leg=3,friction_ratio=1.4" (the colon and what follows may be absent; a list is 0.15;0.151;...).
+/// Reads "leg_contact:leg=3,friction_ratio=1.4" (a list is 0.15;0.151;...; an effect without parameters is its id).
 /// @param info_of  the catalogue: a wheel's, or walker_effect_info
-/// @throws std::invalid_argument as effect_from_values, and for text that cannot be read (quotes it)
+/// @throws std::invalid_argument as effect_from_values, for text that cannot be read (quotes it), and for text that
+///         names no size, so that the effect would do nothing
 Effect effect_from_text(std::string_view text, const NominalValues& nominal,
                         const EffectInfo& (*info_of)(std::string_view) = effect_info);
+/// The same of one effect, by whose id the text begins.
+Effect effect_from_text(std::string_view text, const NominalValues& nominal, const EffectInfo& info);
 /// Does the inverse, of a wheel's effects and of a walker's, with every value in as many digits as it needs.
 std::string effect_text(const Effect& effect);
 

@@ -15,6 +15,11 @@ EffectParameter sized(std::string name, std::string unit, double lower, double u
   return effect_parameter(std::move(name), std::move(unit), neutral, lower, upper, std::move(meaning));
 }
 
+EffectParameter placed(std::string name, std::string unit, double lower, double upper, std::string meaning,
+                       double neutral = 0) {
+  return effect_place(std::move(name), std::move(unit), neutral, lower, upper, std::move(meaning));
+}
+
 void add_sensors(std::vector<EffectInfo>& all) {
   for (const auto& [state, unit, most] : {std::tuple("half_angle_rad", "rad", 0.02),
                                           {"stance_rate_rad_s", "rad/s", 0.2},
@@ -64,16 +69,16 @@ std::vector<EffectInfo> make_effects() {
       {"slope_deg_clock",
        "the mean slope swings with the clock",
        {sized("amplitude", "deg", 0, 1.5, "A in A cos(2 pi f t), t since the first row of the first trial"),
-        sized("frequency_hz", "Hz", 1e-4, 2, "f in that", 0.05)}},
+        placed("frequency_hz", "Hz", 1e-4, 2, "f in that", 0.05)}},
       {"slope_deg_stretch",
        "the mean slope differs on a stretch of the way",
        {sized("change", "deg", -1.5, 1.5, "added there"),
-        sized("from_m", "m", 0, 1000, "beginning of the stretch, by the standing foot's position"),
-        sized("to_m", "m", 0, 1000, "its end", 1)}},
+        placed("from_m", "m", 0, 1000, "beginning of the stretch, by the standing foot's position"),
+        placed("to_m", "m", 0, 1000, "its end", 1)}},
       {"memory",
        "the slopes of successive steps are correlated",
        {sized("correlation", "", -0.9, 0.9, "of a step's slope with the last one's"),
-        sized("noise_number", "", 1, 1, "the slope is the only noise", 1)}},
+        placed("noise_number", "", 1, 1, "the slope is the only noise", 1)}},
       {"outliers",
        "some steps meet a slope from a spread four times as wide",
        {sized("share", "", 0, 0.2, "of the steps")}},

@@ -342,17 +342,7 @@ WalkerRequest walker_simulate_request(const Options& o, const std::string& line)
     walker.reality = walker_reality(o);
     return walker;
   }
-  for (const std::string& text : o.all("effect")) {
-    const std::vector<std::string> parts = split(text, ':');
-    if (parts.size() != 2)
-      throw std::invalid_argument(fmt::format("--effect: '{}' is not of the form ID:NAME=VALUE,...", text));
-    for (const std::string& one : split(parts[1], ',')) {
-      const std::vector<std::string> both = split(one, '=');
-      if (both.size() != 2)
-        throw std::invalid_argument(fmt::format("--effect: '{}' is not of the form ID:NAME=VALUE,...", text));
-      walker.effects.emplace_back(parts[0] + "." + both[0], number_value("effect", both[1]));
-    }
-  }
+  walker.effects = analysis::effects_of_walks(walker.settings.front(), o.all("effect"));
   return walker;
 }
 

@@ -56,6 +56,30 @@ TEST(EffectCatalogue, WhatIsNotNamedIsNeutralOrAsStated) {
   EXPECT_EQ(effect_from_text("slip_reversal", nominal).values.size(), 0U);
 }
 
+// Without a size it would be silently without effect; the refusal names what it takes.
+TEST(EffectCatalogue, AnEffectIsTakenWithASizeOnly) {
+  for (const std::vector<EffectInfo>* all : {&effect_catalogue(), &walker_effects()})
+    for (const EffectInfo& info : *all) {
+      if (info.parameters.empty()) continue;
+      const std::string said = message_of([&] { effect_from_text(info.id, nominal, info); });
+      EXPECT_EQ(said.find("effect " + info.id + ": does nothing without "), 0U) << said;
+      for (const EffectParameter& p : info.parameters)
+        EXPECT_NE(said.find(p.name + "=VALUE"), std::string::npos) << said;
+    }
+  EXPECT_EQ(message("leg_contact:leg=3"),
+            "effect leg_contact: does nothing without friction_ratio or restitution_ratio; it takes leg in [0, 7], "
+            "friction_ratio in [0.1, 5], restitution_ratio in [0, 3], written "
+            "leg_contact:leg=VALUE,friction_ratio=VALUE,restitution_ratio=VALUE");
+  EXPECT_EQ(message("contact_outliers:share=0.1")
+                .find("effect contact_outliers: does nothing without share and "
+                      "friction_ratio; "),
+            0U);
+  EXPECT_EQ(message_of([] {
+              effect_from_text("slope_deg_clock:frequency_hz=1", {}, walker_effect_info);
+            }).find("effect slope_deg_clock: does nothing without amplitude; "),
+            0U);
+}
+
 TEST(EffectCatalogue, RefusesWhatItDoesNotUnderstand) {
   EXPECT_NE(message("gravity").find("effect: \"gravity\" is none of contact_distribution, initial_speed"),
             std::string::npos);

@@ -168,7 +168,7 @@ TEST(Laboratory, ResistingTorquesDoTheirWork) {
   EXPECT_LT(viscous, 0.004 * turn * 6.5);
   EXPECT_GT(air, 0.001 * turn * 9);
   EXPECT_LT(air, 0.001 * turn * 42);
-  EXPECT_NEAR(drag_work("rolling_resistance"), 0, 1e-11);
+  EXPECT_NEAR(drag_work("rolling_resistance:torque_n_m=0"), 0, 1e-11);
 }
 
 // A parabola of sag f over a length l has the slope of the plane plus 4 f/l at its start and minus at its end, and the
@@ -367,7 +367,7 @@ TEST(Laboratory, RefusesWhatItCannotBuild) {
             }),
             "effect inertia: ratio: 3 is outside [0.5, 2]");
   EXPECT_EQ(message([](LaboratorySetup& s) {
-              s.effects = {effect("bounce"), effect("bounce")};
+              s.effects = {effect("bounce:rebound_lost=0.1"), effect("bounce:rebound_lost=0.1")};
             }),
             "effect bounce: given twice");
 }

@@ -46,9 +46,26 @@ TEST_F(SimulateCommand, RealityLeavesNothingBehindWhenItIsMisunderstood) {
   EXPECT_EQ(refused({"--effect", "bounce"}), "metastable: --effect: needs --reality\n");
   EXPECT_EQ(refused({"--reality", "--effect", "inertia:ratio=9"}),
             "metastable: effect inertia: ratio: 9 is outside [0.5, 2]\n");
+  EXPECT_EQ(
+      refused({"--reality", "--effect", "bounce"}),
+      "metastable: effect bounce: does nothing without rebound_lost; it takes rebound_lost in [0, 1], onset_rad_s in "
+      "[0, 50] rad/s, written bounce:rebound_lost=VALUE,onset_rad_s=VALUE\n");
   EXPECT_EQ(refused({"--reality", "--outside", "planks"}),
             "metastable: --outside: 'planks' is not of the form ID:SIZE\n");
   EXPECT_EQ(refused({"--reality", "--outside", "planks:7"}), "metastable: effect planks: size 7 is outside [0, 0.9]\n");
+  const auto walker = [&](const char* name, std::vector<std::string> words) {
+    words.insert(words.begin(), {"--walker", name});
+    return refused(words);
+  };
+  const std::string damping =
+      "metastable: effect hip_damping: does nothing without damping; it takes damping in [0, 5] N "
+      "m s/rad, written hip_damping:damping=VALUE\n";
+  EXPECT_EQ(walker("compass", {"--effect", "hip_damping"}), damping);
+  EXPECT_EQ(walker("compass", {"--reality", "--effect", "hip_damping"}), damping);
+  EXPECT_EQ(walker("simplest", {"--effect", "hip_damping:damping=3"}),
+            "metastable: effect hip_damping: damping: 3 is outside [0, 2]\n");
+  EXPECT_EQ(walker("simplest", {"--effect", "leg_mass:higher=0.1"}),
+            "metastable: --effect: 'leg_mass' is none of hip_damping, hip_dry_friction, impact_loss, foot_slip\n");
   EXPECT_TRUE(left_behind().empty());
   const std::vector<std::string> fine{"simulate",          "--reality", "--effect",
                                       "inertia:ratio=1.1", "--effect",  "leg_contact:leg=3,friction_ratio=1.4",
