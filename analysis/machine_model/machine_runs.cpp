@@ -235,8 +235,8 @@ std::vector<std::string> look_over(const Machine& machine, const MachineRuns& ru
   const auto fitted = static_cast<std::size_t>(
       std::ranges::count_if(machine.parameters, [](const MachineParameter& p) { return p.sd > 0; }));
   if (transitions < fitted)
-    throw std::invalid_argument(
-        fmt::format("runs: {} transitions are fewer than the {} parameters to be refitted", transitions, fitted));
+    throw std::invalid_argument(fmt::format("runs: {} transition{} fewer than the {} parameters to be refitted",
+                                            transitions, transitions == 1 ? " is" : "s are", fitted));
   require_launch(machine, runs);
   std::vector<std::string> said;
   for (std::size_t j = 0; j < machine.observe.size(); ++j) {

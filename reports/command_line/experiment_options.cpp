@@ -260,7 +260,7 @@ void declare_simulate(Options& o) {
              "The paper's three experiments instead of one setting: 51 fast and 48 slow trials at 9.59 deg, 50 "
              "at 7.02 deg, angle.csv at 120 Hz; eta ~ N(0.54, 0.045^2) and mu ~ N(0.352, 0.043^2) unless given");
   o.add("trials", "N", "50", "Trials, 1..1000000");
-  o.add("collisions", "N", "16", "Most collisions of a trial, 1..100000 (walker: strikes, default 1000)");
+  o.add("collisions", "N", "16", "Most collisions of a trial, 1..100000 (walker: strikes, 2..1000000, default 1000)");
   o.add("angle-rate", "HZ", "", "Write angle.csv too, as a camera of this rate sees the trials, 10..100000 (120)");
   o.add("angle-noise", "RAD", "", "White noise of the angle, >= 0 (default 0.0002; needs --angle-rate)");
   add_laboratory_options(o);
@@ -337,7 +337,7 @@ WalkerRequest walker_simulate_request(const Options& o, const std::string& line)
     if (o.given(name) && !o.flag("reality")) throw std::invalid_argument(fmt::format("--{}: needs --reality", name));
   WalkerRequest walker = walker_request(o, line, own);
   walker.walks.trials = o.whole("trials", 1, 1000000);
-  if (o.given("collisions")) walker.walks.longest = o.whole("collisions", 1, 1000000);
+  if (o.given("collisions")) walker.walks.longest = o.whole("collisions", 2, 1000000);  // a step has two
   if (o.flag("reality")) {
     walker.reality = walker_reality(o);
     return walker;

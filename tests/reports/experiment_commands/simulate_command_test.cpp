@@ -54,7 +54,7 @@ TEST_F(SimulateCommand, RealityLeavesNothingBehindWhenItIsMisunderstood) {
             "metastable: --outside: 'planks' is not of the form ID:SIZE\n");
   EXPECT_EQ(refused({"--reality", "--outside", "planks:7"}), "metastable: effect planks: size 7 is outside [0, 0.9]\n");
   const auto walker = [&](const char* name, std::vector<std::string> words) {
-    words.insert(words.begin(), {"--walker", name});
+    words.insert(words.begin(), {"--walker", name, "--slope-sd", "0.1"});
     return refused(words);
   };
   const std::string damping =
@@ -62,6 +62,8 @@ TEST_F(SimulateCommand, RealityLeavesNothingBehindWhenItIsMisunderstood) {
       "m s/rad, written hip_damping:damping=VALUE\n";
   EXPECT_EQ(walker("compass", {"--effect", "hip_damping"}), damping);
   EXPECT_EQ(walker("compass", {"--reality", "--effect", "hip_damping"}), damping);
+  EXPECT_EQ(walker("compass", {"--reality", "--collisions", "1"}),
+            "metastable: --collisions: 1 is outside 2..1000000\n");
   EXPECT_EQ(walker("simplest", {"--effect", "hip_damping:damping=3"}),
             "metastable: effect hip_damping: damping: 3 is outside [0, 2]\n");
   EXPECT_EQ(walker("simplest", {"--effect", "leg_mass:higher=0.1"}),
