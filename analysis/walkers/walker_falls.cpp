@@ -4,6 +4,7 @@
 #include <cmath>
 #include <cstdint>
 #include <limits>
+#include <numeric>
 #include <optional>
 #include <stdexcept>
 #include <utility>
@@ -41,24 +42,24 @@ class Falls {
         threads_(threads),
         spacing_(options.spacing),
         lattice_(map.scores, map.scores == 1 ? score_spacing : score_spacing_of_several, score_reach),
-        frames_(study.orbit.frames),
+        frames_(study.frames),
         mesh_(map, frames_, start, markov::with_gaits(options, study.gaits)),
-        passage_(study.gaits.states.size() < 2
-                     ? markov::mesh_passage(mesh_, start)
-                     : markov::coupled_passage(mesh_, start, markov::gait_classes(mesh_, study.gaits.states, frames_),
-                                               study.gaits.states.size())
-                           .passage) {
+        passage_(markov::passage_with_gaits(mesh_, start, study.gaits.orbits, frames_).passage),
+        turns_(map.phases) {
     const markov::Chain chain = mesh_.chain();
     last_ = markov::last_steps(chain, passage_.visits, steps_of_a_fall);
-    std::vector<std::uint8_t> near_gait;
+    const markov::GaitOrbit& orbit = study.gaits.orbits.front();
     for (std::size_t i = 0; i < mesh_.size(); ++i) {
       state_.push_back(mesh_.state(i));
       phase_.push_back(mesh_.phase(i));
-      double square = 0;
-      for (const double u : place(phase_[i], state_[i])) square += u * u;
-      near_gait.push_back(square <= 1);
     }
-    bound_ = markov::passage_to(chain, near_gait).fail;
+    turn_ = phase_;
+    if (study.gaits.orbits.size() == 1 && orbit.size() > 1) {
+      const markov::GaitClasses classes = markov::gait_classes(mesh_, study.gaits.orbits, frames_);
+      for (std::size_t i = 0; i < mesh_.size(); ++i) turn_[i] += map_.phases * static_cast<int>(classes.of_node[i]);
+      turns_ = map_.phases * static_cast<int>(orbit.size());
+    }
+    bound_ = markov::passage_to(chain, study.period > 0 ? near_gait(orbit) : often_met()).fail;
   }
 
   WalkerFalls tell() {
@@ -67,7 +68,7 @@ class Falls {
     for (std::size_t k = falls.moments.state_names.size(); k < static_cast<std::size_t>(map_.dimension); ++k)
       falls.moments.state_names.push_back("x" + std::to_string(k + 1));
     for (const NamedNoise& noise : noises_) falls.moments.noise_names.push_back(noise.name);
-    falls.moments.by_phase.assign(static_cast<std::size_t>(map_.phases), 0.0);
+    falls.moments.by_phase.assign(static_cast<std::size_t>(turns_), 0.0);
     tried_.resize(mesh_.size());
     const std::vector<std::vector<std::size_t>> shares = nodes_by_call();
     markov::parallel_for(shares.size(), threads_, [&](std::size_t share) { try_noise_from(shares[share]); });
@@ -75,7 +76,7 @@ class Falls {
     falls.moments.regime = profile(passage_.distribution, {});
     for (std::size_t k = last_.likeliest.size(); k-- > 0;) falls.moments.likeliest.push_back(path_step(k));
     for (std::size_t i = 0; i < mesh_.size(); ++i) {
-      falls.moments.by_phase[static_cast<std::size_t>(phase_[i])] += last_.share[0][i];
+      falls.moments.by_phase[static_cast<std::size_t>(turn_[i])] += last_.share[0][i];
       falls.section.push_back(
           {state_[i], place(phase_[i], state_[i]), passage_.distribution[i], last_.share[0][i], bound_[i]});
     }
@@ -83,6 +84,39 @@ class Falls {
   }
 
  private:
+  /// Marks the nodes within one sd of where a gait comes through.
+  std::vector<std::uint8_t> near_gait(const markov::GaitOrbit& orbit) const {
+    std::vector<std::vector<double>> turns;
+    for (const auto& state : orbit) turns.push_back(place(0, state));
+    std::vector<std::uint8_t> near;
+    for (std::size_t i = 0; i < state_.size(); ++i) {
+      const std::vector<double> at = place(phase_[i], state_[i]);
+      near.push_back(std::any_of(turns.begin(), turns.begin() + (phase_[i] == 0 ? turns.end() - turns.begin() : 1),
+                                 [&](const std::vector<double>& turn) {
+                                   double square = 0;
+                                   for (std::size_t k = 0; k < at.size(); ++k)
+                                     square += (at[k] - turn[k]) * (at[k] - turn[k]);
+                                   return square <= 1;
+                                 }));
+    }
+    return near;
+  }
+
+  /// Marks the nodes that are met most in the metastable regime, half of it.
+  std::vector<std::uint8_t> often_met() const {
+    const std::vector<double>& met = passage_.distribution;
+    std::vector<std::size_t> order(met.size());
+    std::iota(order.begin(), order.end(), std::size_t{0});
+    std::stable_sort(order.begin(), order.end(), [&](std::size_t a, std::size_t b) { return met[a] > met[b]; });
+    std::vector<std::uint8_t> often(met.size(), 0);
+    double share = 0;
+    for (std::size_t k = 0; k < order.size() && share < 0.5 * map_.phases; ++k) {
+      often[order[k]] = 1;
+      share += met[order[k]];
+    }
+    return often;
+  }
+
   std::vector<double> place(int phase, std::span<const double> state) const {
     const markov::NoiseFrame& frame = frames_[static_cast<std::size_t>(phase)];
     const std::size_t d = state.size();
@@ -222,7 +256,7 @@ class Falls {
 
   PathStep path_step(std::size_t k) const {
     const std::size_t i = last_.likeliest[k], d = state_[i].size(), scores = noises_.size();
-    PathStep step{phase_[i], state_[i], {}};
+    PathStep step{turn_[i], state_[i], {}};
     const Tried& tried = tried_[i];
     double least = std::numeric_limits<double>::infinity();
     for (std::size_t n = 0; n < tried.falls.size(); ++n) {
@@ -254,7 +288,8 @@ class Falls {
   markov::Mesh mesh_;
   markov::MeshPassage passage_;
   std::vector<std::vector<double>> state_;
-  std::vector<int> phase_;
+  std::vector<int> phase_, turn_;  ///< of each node; turns go round a gait of several revolutions
+  int turns_;
   std::vector<double> bound_;
   markov::LastSteps last_;
   std::vector<Tried> tried_;
@@ -270,7 +305,7 @@ WalkerFalls how_it_falls(const markov::BatchMap& map, std::span<const double> st
   const double spacing = study.sizes.at(1).spacing;
   WalkerFalls falls =
       Falls(
-          markov::over_revolutions(map, study.period), start, noises,
+          markov::over_revolutions(map, static_cast<int>(study.frames.size()) / map.phases), start, noises,
           {.spacing = spacing, .seed = options.seed, .most_bytes = options.most_bytes, .row_states = study.row_states},
           study, options.threads)
           .tell();

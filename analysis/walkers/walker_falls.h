@@ -37,7 +37,8 @@ struct NamedNoise {
 /// Describes the last six steps of what starts at `start` (a state at phase 0), on the middle one of the study's
 /// meshes: states by nodes, noise by a lattice of scores 0.2 apart (of several scores, 0.6). The most likely path goes
 /// through nodes; its noise is that which leads nearest to the next node, and the least that fails. "The gait" is the
-/// noise-free orbit.
+/// noise-free orbit; where there is none, half of the metastable regime, what is met most. Phases of a gait of several
+/// revolutions are its turns: a step belongs to the turn that it would fall into without noise.
 /// @param noises  one for each score
 /// @param study  with its orbit and two meshes or more, as mesh_study() gives it
 /// @throws std::invalid_argument for another number of noises; as markov::Mesh and markov::mesh_passage

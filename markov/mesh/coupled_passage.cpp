@@ -18,6 +18,7 @@ constexpr double balance_tolerance = 1e-6;  // and of any class's visits, beyond
 constexpr int still_rounds = 3;             // so many rounds running
 constexpr int inverse_rounds = 200;         // of the small chain's inverse iteration
 constexpr double settled_rate = 1e-12;
+constexpr double negligible_left = 1e-4;  // walkers on their way for each failure
 constexpr double settled = 1e-9;  // of survivors in the first gait: what their failures change by in a revolution,
 constexpr int head = 4000;        // followed for so many steps if they do not settle
 
@@ -37,15 +38,16 @@ std::vector<std::uint32_t> likeliest_steps(const Mesh& mesh) {
 /// Lumps visits by class, solves the small chain they make, and gives the classes their visits.
 class Aggregation {
  public:
-  Aggregation(const Mesh& mesh, const std::vector<std::uint32_t>& gait, std::size_t gaits)
+  Aggregation(const Mesh& mesh, const GaitClasses& classes)
       : mesh_(mesh),
-        classes_(gaits * static_cast<std::size_t>(mesh.phases())),
+        classes_(classes.gait.size() * static_cast<std::size_t>(mesh.phases())),
         kill_(classes_),
         leave_(classes_),
         flow_(classes_ * classes_),
         mass_(classes_) {
     for (std::size_t i = 0; i < mesh.size(); ++i)
-      class_.push_back(gait[i] * static_cast<std::uint32_t>(mesh.phases()) + static_cast<std::uint32_t>(mesh.phase(i)));
+      class_.push_back(classes.of_node[i] * static_cast<std::uint32_t>(mesh.phases()) +
+                       static_cast<std::uint32_t>(mesh.phase(i)));
   }
 
   std::size_t size() const { return classes_; }
@@ -166,64 +168,134 @@ void smooth(const Mesh& mesh, std::span<const double> start, std::vector<double>
   for (std::size_t i = 0; i < y.size(); ++i) y[i] = 0.5 * (y[i] + led[i] + start[i]);
 }
 
-}  // namespace
-
-std::vector<std::uint32_t> gait_classes(const Mesh& mesh, const std::vector<std::vector<double>>& gaits,
-                                        std::span<const NoiseFrame> frames) {
-  const std::vector<std::uint32_t> next = likeliest_steps(mesh);
-  const std::size_t d = gaits.front().size();
-  const NoiseFrame& frame = frames.front();
-  const auto nearest = [&](std::uint32_t node) {
-    const std::vector<double> state = mesh.state(node);
-    std::uint32_t best = 0;
-    double least = std::numeric_limits<double>::infinity();
-    for (std::uint32_t g = 0; g < gaits.size(); ++g) {
-      double squared = 0;
-      for (std::size_t k = 0; k < d; ++k) {
-        double u = 0;
-        for (std::size_t i = 0; i < d; ++i) u += frame.inverse[k * d + i] * (state[i] - gaits[g][i]);
-        squared += u * u;
-      }
-      if (squared < least) {
-        least = squared;
-        best = g;
-      }
-    }
-    return best;
-  };
-  constexpr std::uint32_t unknown = std::numeric_limits<std::uint32_t>::max();
-  std::vector<std::uint32_t> gait(mesh.size(), unknown), path;
-  std::vector<std::uint32_t> walked(mesh.size(), 0);
-  std::uint32_t walk = 0;
-  for (std::uint32_t i = 0; i < mesh.size(); ++i) {
-    path.clear();
-    ++walk;
-    std::uint32_t at = i;
-    for (; gait[at] == unknown && walked[at] != walk; at = next[at]) {
-      walked[at] = walk;
-      path.push_back(at);
-    }
-    std::uint32_t found = gait[at];
-    if (found == unknown) {  // a new cycle, or a node that only fails: its state at phase 0, if it has one
-      std::uint32_t seen = at;
-      for (int phase = 0; phase < mesh.phases() && mesh.phase(seen) != 0; ++phase) seen = next[seen];
-      found = nearest(seen);
-    }
-    for (const std::uint32_t node : path) gait[node] = found;
+double squared_distance(const NoiseFrame& frame, const std::vector<double>& a, const std::vector<double>& b) {
+  const std::size_t d = a.size();
+  double squared = 0;
+  for (std::size_t k = 0; k < d; ++k) {
+    double u = 0;
+    for (std::size_t i = 0; i < d; ++i) u += frame.inverse[k * d + i] * (a[i] - b[i]);
+    squared += u * u;
   }
-  return gait;
+  return squared;
 }
 
-CoupledPassage coupled_passage(const Mesh& mesh, std::span<const double> start, const std::vector<std::uint32_t>& gait,
-                               std::size_t gaits) {
-  CoupledPassage found{.passage = mesh_passage(mesh, start, settled, head, true)};
+/// Leads from every node along the likeliest steps.
+class Likeliest {
+ public:
+  Likeliest(const Mesh& mesh, const std::vector<GaitOrbit>& gaits, const NoiseFrame& frame, GaitClasses& found)
+      : mesh_(mesh), gaits_(gaits), frame_(frame), next_(likeliest_steps(mesh)), found_(found) {
+    found.gaits = gaits.size();
+    found.revolutions = static_cast<int>(gaits.front().size());
+    found.of_node.assign(mesh.size(), unknown);
+    for (std::uint32_t g = 0; g < gaits.size(); ++g) {
+      first_.push_back(static_cast<std::uint32_t>(found.gait.size()));
+      found.gait.insert(found.gait.end(), gaits[g].size(), g);
+    }
+  }
+
+  void classify() {
+    std::vector<std::uint32_t> path, walked(mesh_.size(), 0);
+    for (std::uint32_t i = 0, walk = 1; i < mesh_.size(); ++i, ++walk) {
+      path.clear();
+      std::uint32_t at = i;
+      for (; found_.of_node[at] == unknown && walked[at] != walk; at = next_[at]) {
+        walked[at] = walk;
+        path.push_back(at);
+      }
+      std::uint32_t led = found_.of_node[at];
+      if (led == unknown) led = nearest_on_its_way(at);  // a new cycle, or a node that only fails
+      for (; !path.empty(); path.pop_back()) {
+        const std::uint32_t node = path.back();
+        if (mesh_.phase(next_[node]) == 0 && next_[node] != node) led = one_before(led);
+        found_.of_node[node] = led;
+      }
+    }
+  }
+
+ private:
+  static constexpr std::uint32_t unknown = std::numeric_limits<std::uint32_t>::max();
+
+  /// Returns the class in its turn before another.
+  std::uint32_t one_before(std::uint32_t of) const {
+    const std::uint32_t first = first_[found_.gait[of]];
+    return of > first ? of - 1 : first + static_cast<std::uint32_t>(gaits_[found_.gait[of]].size()) - 1;
+  }
+
+  /// Returns the class of a node by the next state of phase 0 that it leads to.
+  std::uint32_t nearest_on_its_way(std::uint32_t node) const {
+    std::uint32_t seen = node;
+    for (int phase = 0; phase < mesh_.phases() && mesh_.phase(seen) != 0; ++phase) seen = next_[seen];
+    const std::uint32_t found = nearest(mesh_.state(seen));
+    return seen == node ? found : one_before(found);
+  }
+
+  std::uint32_t nearest(const std::vector<double>& state) const {
+    std::uint32_t best = 0;
+    double least = std::numeric_limits<double>::infinity();
+    for (std::uint32_t g = 0; g < gaits_.size(); ++g)
+      for (std::uint32_t turn = 0; turn < gaits_[g].size(); ++turn) {
+        const double squared = squared_distance(frame_, state, gaits_[g][turn]);
+        if (squared >= least) continue;
+        least = squared;
+        best = first_[g] + turn;
+      }
+    return best;
+  }
+
+  const Mesh& mesh_;
+  const std::vector<GaitOrbit>& gaits_;
+  const NoiseFrame& frame_;
+  std::vector<std::uint32_t> next_, first_;  ///< likeliest step of each node; first class of each gait
+  GaitClasses& found_;
+};
+
+constexpr std::uint32_t nowhere = std::numeric_limits<std::uint32_t>::max();
+
+/// Returns the gait that each node is near; nowhere for those that are near none.
+std::vector<std::uint32_t> near_gaits(const Mesh& mesh, const std::vector<GaitOrbit>& gaits, const NoiseFrame& frame) {
+  std::vector<std::uint32_t> near(mesh.size(), nowhere);
+  for (std::size_t i = 0; i < mesh.size(); ++i) {
+    if (mesh.phase(i) != 0) continue;
+    const std::vector<double> state = mesh.state(i);
+    for (std::uint32_t g = 0; g < gaits.size(); ++g)
+      for (const std::vector<double>& at : gaits[g])
+        if (squared_distance(frame, state, at) <= 1) near[i] = g;
+  }
+  return near;
+}
+
+/// Returns the expected failures of walkers who leave `x` (of nodes near one gait, or of the start) before they are
+/// near a gait again.
+double failures_from(const Mesh& mesh, const std::vector<std::uint32_t>& near, std::vector<double> x) {
+  std::vector<double> led(mesh.size());
+  double failures = 0, left = std::numeric_limits<double>::infinity();
+  for (int product = 0; product < product_limit && left > negligible_left * failures; ++product) {
+    for (std::size_t i = 0; i < x.size(); ++i) failures += x[i] * mesh.kill()[i];
+    mesh.apply_left(x, led);
+    left = 0;
+    for (std::size_t i = 0; i < x.size(); ++i) left += x[i] = near[i] == nowhere ? led[i] : 0;
+  }
+  return failures;
+}
+
+}  // namespace
+
+GaitClasses gait_classes(const Mesh& mesh, const std::vector<GaitOrbit>& gaits, std::span<const NoiseFrame> frames) {
+  GaitClasses found;
+  Likeliest(mesh, gaits, frames.front(), found).classify();
+  return found;
+}
+
+CoupledPassage coupled_passage(const Mesh& mesh, std::span<const double> start, const GaitClasses& classes) {
+  CoupledPassage found{.passage = mesh_passage(mesh, start, settled, head, true, classes.revolutions)};
   MeshPassage& passage = found.passage;
   found.first_rate = passage.failure_rate;
+  if (classes.gaits == 1 && passage.settled) return found;
   std::vector<double> b(mesh.size(), 0.0), led(mesh.size());
   const Mesh::Corners corners = mesh.corners(0, start);
   for (int c = 0; c < corners.count; ++c)
     b[corners.node[static_cast<std::size_t>(c)]] += corners.weight[static_cast<std::size_t>(c)];
-  Aggregation aggregation(mesh, gait, gaits);
+  Aggregation aggregation(mesh, classes);
   std::vector<double> start_by_class(aggregation.size(), 0.0);
   for (std::size_t i = 0; i < b.size(); ++i) start_by_class[aggregation.of(i)] += b[i];
   std::vector<double> y = passage.visits;
@@ -246,9 +318,38 @@ CoupledPassage coupled_passage(const Mesh& mesh, std::span<const double> start, 
   passage.steps_lower = std::accumulate(lower.begin(), lower.end(), 0.0);
   passage.steps = std::sqrt(passage.steps_upper * passage.steps_lower);
   passage.failure_rate = last_rate(mesh, aggregation, y, passage.products);
-  found.share.assign(gaits, 0.0);
-  for (std::size_t i = 0; i < y.size(); ++i) found.share[gait[i]] += y[i] / last;
+  found.share.assign(classes.gaits, 0.0);
+  for (std::size_t i = 0; i < y.size(); ++i) found.share[classes.gait[classes.of_node[i]]] += y[i] / last;
   passage.visits = std::move(y);
+  return found;
+}
+
+std::vector<double> failures_by_gait(const Mesh& mesh, std::span<const double> start, std::span<const double> visits,
+                                     const std::vector<GaitOrbit>& gaits, std::span<const NoiseFrame> frames) {
+  const std::vector<std::uint32_t> near = near_gaits(mesh, gaits, frames.front());
+  std::vector<double> failures;
+  for (std::uint32_t g = 0; g < gaits.size(); ++g) {
+    std::vector<double> begins(mesh.size(), 0.0);
+    for (std::size_t i = 0; i < begins.size(); ++i)
+      if (near[i] == g) begins[i] = visits[i];
+    failures.push_back(failures_from(mesh, near, std::move(begins)));
+  }
+  std::vector<double> begins(mesh.size(), 0.0);
+  const Mesh::Corners corners = mesh.corners(0, start);
+  for (std::size_t c = 0; c < static_cast<std::size_t>(corners.count); ++c)
+    if (near[corners.node[c]] == nowhere) begins[corners.node[c]] += corners.weight[c];
+  failures.front() += failures_from(mesh, near, std::move(begins));
+  const double all = std::accumulate(failures.begin(), failures.end(), 0.0);
+  for (double& share : failures) share /= all;
+  return failures;
+}
+
+CoupledPassage passage_with_gaits(const Mesh& mesh, std::span<const double> start, const std::vector<GaitOrbit>& gaits,
+                                  std::span<const NoiseFrame> frames) {
+  if (gaits.size() > 1 || gaits.front().size() > 1)
+    return coupled_passage(mesh, start, gait_classes(mesh, gaits, frames));
+  CoupledPassage found{.passage = mesh_passage(mesh, start)};
+  found.first_rate = found.passage.failure_rate;
   return found;
 }
 

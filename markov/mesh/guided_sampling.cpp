@@ -140,7 +140,7 @@ class Guided {
   /// nothing near leads to failure in time, so far as the mesh knows.
   double take(const Fan& fan, std::uint64_t number, int left, std::span<double> state) const {
     const std::size_t d = state.size(), m = fan.weight.size();
-    const int phase = (burn_in(number) + window_ - left + 1) % map_.phases;
+    const int phase = (burn_in(number) + window_ - left + 1) % mesh_.phases();
     const auto& guide = guide_[static_cast<std::size_t>(left - 1)];
     std::vector<double> worth(m, 0.0);
     double all = 0, mean = 0;

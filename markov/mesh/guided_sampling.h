@@ -31,7 +31,8 @@ struct GuidedRate {
 /// weight times (the mesh's probability of failing in exactly the step asked for, plus a share of its mean), and
 /// carries the ratio as its weight; in the step after, the probability of failing is summed over the lattice. The mean
 /// weight is the failure rate times the share that walks on for so long.
-/// Samples take turns at the phases; windows are lengthened to whole revolutions.
+/// Samples take turns at the phases; windows are lengthened to whole revolutions. Of a gait of several revolutions the
+/// map may be watched over all of them (over_revolutions), the mesh over one.
 /// @throws as checked_step does; std::invalid_argument for options out of range
 GuidedRate guided_failure_rate(const BatchMap& map, const Mesh& mesh, std::span<const double> start,
                                const GuidedOptions& options);

@@ -112,7 +112,10 @@ MeshPassage follow_survivors(const MassRows& rows, std::vector<double> x, double
     const bool still =
         std::abs(turn.failures - last_failures) <= settled_change * turn.failures && distances.back() <= still_distance;
     settled = still ? settled + 1 : 0;
-    if (or_stop && passage.products >= most_products) settled = in_a_row;
+    if (or_stop && passage.products >= most_products && settled < in_a_row) {
+      passage.settled = false;
+      settled = in_a_row;
+    }
     last_failures = turn.failures;
     if (settled == in_a_row) {
       passage.steps_upper = passage.steps + alive * turn.steps / turn.failures;
@@ -134,14 +137,16 @@ MeshPassage follow_survivors(const MassRows& rows, std::vector<double> x, double
 }
 
 MeshPassage mesh_passage(const Mesh& mesh, std::span<const double> start, double settled_change, int most_products,
-                         bool or_stop) {
+                         bool or_stop, int revolutions) {
   std::vector<double> x(mesh.size(), 0.0);
   const Mesh::Corners corners = mesh.corners(0, start);
   for (int c = 0; c < corners.count; ++c)
     x[corners.node[static_cast<std::size_t>(c)]] += corners.weight[static_cast<std::size_t>(c)];
-  return follow_survivors(
-      {mesh.phases(), mesh.kill(), mesh.leave(), [&](auto from, auto to) { mesh.apply_left(from, to); }}, std::move(x),
-      settled_change, most_products, or_stop);
+  MeshPassage passage = follow_survivors(
+      {mesh.phases() * revolutions, mesh.kill(), mesh.leave(), [&](auto from, auto to) { mesh.apply_left(from, to); }},
+      std::move(x), settled_change, most_products, or_stop);
+  for (double& share : passage.distribution) share /= revolutions;
+  return passage;
 }
 
 std::vector<std::vector<double>> failure_in_step(const Mesh& mesh, int window) {

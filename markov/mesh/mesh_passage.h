@@ -19,11 +19,12 @@ struct MeshPassage {
   std::vector<double> distribution;  ///< quasi-stationary, of one phase each summing to one
   std::vector<double> visits;        ///< expected steps that begin in each node, from the start to failure
   int products = 0;
+  bool settled = true;  ///< survivors keep their form; else they were followed no further (`or_stop`)
 };
 
 /// Holds rows as far as a process holds them, all of a mesh or a share of it.
 struct MassRows {
-  int phases = 1;
+  int phases = 1;                                                                  ///< steps of a revolution
   std::span<const double> kill, leave;                                             ///< of its own nodes
   std::function<void(std::span<const double> x, std::span<double> y)> apply_left;  ///< y = x Q
   std::function<void(std::span<double>)> add_up = {};  ///< over all who share the rows; empty: there are no others
@@ -38,8 +39,9 @@ MeshPassage follow_survivors(const MassRows& rows, std::vector<double> start, do
                              int most_products = 20000, bool or_stop = false);
 
 /// Does the same from a state at phase 0 of one mesh.
+/// @param revolutions  of the mesh that count as one, as where survivors come back in turns only
 MeshPassage mesh_passage(const Mesh& mesh, std::span<const double> start, double settled_change = 1e-9,
-                         int most_products = 20000, bool or_stop = false);
+                         int most_products = 20000, bool or_stop = false, int revolutions = 1);
 
 /// Returns u[n][i], n = 0 .. window: the probability that a walker at node i fails in exactly its (n+1)-th step.
 std::vector<std::vector<double>> failure_in_step(const Mesh& mesh, int window);

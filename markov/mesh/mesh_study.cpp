@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <boost/math/distributions/students_t.hpp>
 #include <cmath>
+#include <limits>
 #include <memory>
 #include <mutex>
 #include <stdexcept>
@@ -46,7 +47,7 @@ constexpr double pilot_steps = 4;
 // States of a row where the chance of failing jumps, by dimension: of 32 in one dimension shifts differ by 4 per cent.
 constexpr std::array<int, 4> row_states_by_dimension{256, 32, 16, 16};
 constexpr double memory_side_by_side = 0.5;  // of all: for the meshes of a dear map that grow side by side
-constexpr double same_gait = 1e-5;           // of a number of a state: two orbits that were iterated are one
+constexpr std::size_t most_phases = 15;      // of a mesh
 constexpr double longest_trial_factor = 30;  // times the expected steps: one trial of 1e13 takes longer
 
 /// Returns the coarsest spacings that the extrapolation was found to bear, by dimension.
@@ -110,16 +111,25 @@ SimulationOptions walking(const MeshStudyOptions& options) {
   return {.seed = options.seed, .threads = options.threads, .most_steps = options.simulated_steps};
 }
 
+/// What a study lies around.
+struct Around {
+  NoiseFreeOrbit orbit;
+  int period = 1;                         ///< MeshStudy::period
+  std::uint64_t fails_without_noise = 0;  ///< MeshStudy::fails_without_noise
+  std::vector<NoiseFrame> frames;         ///< of the meshes
+  GaitOrbit own;                          ///< states of phase 0 of a revolution of the meshes
+};
+
 /// Makes one study.
 class Run {
  public:
-  /// @param period  revolutions of the map that one of `map` stands for
-  Run(const BatchMap& map, std::span<const double> start, const MeshStudyOptions& options, NoiseFreeOrbit orbit,
-      int period)
+  /// @param map  as often round as a revolution of the meshes is
+  Run(const BatchMap& map, std::span<const double> start, const MeshStudyOptions& options, Around around)
       : map_(map),
         start_(start),
         options_(options),
-        frames_(orbit.frames),
+        frames_(around.frames),
+        own_(std::move(around.own)),
         sizes_(options.sizes > 0    ? static_cast<std::size_t>(options.sizes)
                : map.dimension == 4 ? 4
                                     : 3),
@@ -129,8 +139,10 @@ class Run {
         rates_(steps_),
         brackets_(steps_) {
     study_.sizes.resize(sizes_);
-    study_.orbit = std::move(orbit);
-    study_.period = period;
+    study_.orbit = std::move(around.orbit);
+    study_.period = around.period;
+    study_.fails_without_noise = around.fails_without_noise;
+    study_.frames = std::move(around.frames);
     map_.step = [this, step = map.step](int phase, auto states, auto scores, auto next, auto failed) {
       step(phase, states, scores, next, failed);
       const std::lock_guard lock(mutex_);
@@ -156,7 +168,6 @@ class Run {
     else
       parallel_for(tasks, at_once_, [&](std::size_t task) { make(task, map_); });
     join();
-    if (walks_know_all()) study_.gait_share.clear();  // they are one gait
     over(meshes_stage);
     foresee_other_ways(study_.steps.value, study_.mixing_steps);
     if (study_.steps.upper > widest * study_.steps.lower)
@@ -190,21 +201,10 @@ class Run {
     return with_gaits(one, study_.gaits);
   }
 
-  bool several_gaits() const { return study_.gaits.states.size() > 1; }
+  bool several_gaits() const { return study_.gaits.orbits.size() > 1; }
 
-  /// Says whether walks from the start know all gaits: there is one, or the others are its own, met some revolutions
-  /// later.
-  bool walks_know_all() const {
-    const std::size_t revolution = frames_.size() / static_cast<std::size_t>(study_.period);
-    return std::ranges::all_of(study_.gaits.states, [&](const std::vector<double>& state) {
-      for (std::size_t phase = 0; phase < frames_.size(); phase += revolution) {
-        bool same = true;
-        for (std::size_t k = 0; k < state.size(); ++k)
-          same = same && std::abs(state[k] - frames_[phase].centre[k]) <= same_gait * (1 + std::abs(state[k]));
-        if (same) return true;
-      }
-      return false;
-    });
+  CoupledPassage passage_of(const Mesh& mesh) const {
+    return passage_with_gaits(mesh, start_, study_.gaits.orbits, frames_);
   }
 
   /// Looks for other gaits around the coarsest mesh, and solves that, grown anew where there are some. Returns its
@@ -219,14 +219,15 @@ class Run {
     };
     const Mesh mesh(map_, frames_, start_, alone);
     coarsest_ = spent();
-    study_.gaits = find_other_gaits(map_, frames_, start_, mesh, alone);
+    study_.gaits.orbits = {own_};
+    if (study_.period > 0) study_.gaits = find_other_gaits(map_, frames_, own_, start_, mesh, alone);
     searched_ = spent();
     if (!study_.gaits.trap.empty()) throw Disagreement("mesh study: " + study_.gaits.trap + ": no number is given");
-    if (!several_gaits() && !failing_jumps(map_, frames_, mesh, mesh_passage(mesh, start_).visits, alone))
+    if (!several_gaits() && !failing_jumps(map_, frames_, mesh, passage_of(mesh).passage.visits, alone))
       return solve(mesh, 0, 0);
     if (several_gaits()) {
       const Mesh with_all(map_, frames_, start_, mesh_options(0, 0));
-      if (!failing_jumps(map_, frames_, with_all, visits(with_all), mesh_options(0, 0))) {
+      if (!failing_jumps(map_, frames_, with_all, passage_of(with_all).passage.visits, mesh_options(0, 0))) {
         coarsest_ = spent();
         return solve(with_all, 0, 0);
       }
@@ -236,11 +237,6 @@ class Run {
     const Mesh averaged(map_, frames_, start_, mesh_options(0, 0));
     coarsest_ = spent();
     return solve(averaged, 0, 0);
-  }
-
-  std::vector<double> visits(const Mesh& mesh) const {
-    return coupled_passage(mesh, start_, gait_classes(mesh, study_.gaits.states, frames_), study_.gaits.states.size())
-        .passage.visits;
   }
 
   /// Plans what is left once the coarsest mesh has told how long it takes.
@@ -259,18 +255,26 @@ class Run {
   /// Foresees the rows of both other ways. @param steps, mixing  as far as they are known
   void foresee_other_ways(double steps, double mixing) {
     const auto allowed = static_cast<double>(options_.simulated_steps), expected = std::max(1.0, steps);
-    const bool to_failure = allowed / expected >= static_cast<double>(fewest_trials) && walks_know_all();
+    const bool to_failure = allowed / expected >= static_cast<double>(fewest_trials) && !several_gaits();
     const double longest = least_counted_share * allowed / static_cast<double>(walk_count);
     const double simulated = to_failure ? std::min(allowed, static_cast<double>(most_trials) * expected)
                                         : static_cast<double>(walk_count) * expected * -std::expm1(-longest / expected);
     const std::lock_guard lock(mutex_);
     work_.replan(simulation_stage, simulated);
-    const int forgets = forgetting_steps(mixing);
+    const int forgets = forgetting_steps(std::min(mixing, steps_to_the_orbit()));
     const bool guided = options_.guided_samples > 0 && !several_gaits() && steps > sampled_from &&
                         steps > sampled_windows * std::min(forgets, longest_window);
     const double grown = map_.dear ? 0 : coarsest_.rows * mesh_work(1);
     work_.replan(guided_stage, guided ? grown + guided_rows(forgets, std::min(forgets, longest_window)) : 0);
     tell();
+  }
+
+  /// Returns the e-folding of the way back to an orbit of several revolutions: in which of them a walker is bears on no
+  /// rate. Infinite for all others.
+  double steps_to_the_orbit() const {
+    if (own_.size() == 1) return std::numeric_limits<double>::infinity();
+    const double modulus = std::clamp(std::abs(study_.orbit.eigenvalues.front()), 1e-6, 1 - 1e-6);
+    return static_cast<double>(study_.orbit.frames.size()) / -std::log(modulus);
   }
 
   double guided_rows(int forgets, int window) const {
@@ -313,13 +317,8 @@ class Run {
 
   /// Returns the mesh's bytes.
   std::size_t solve(const Mesh& mesh, std::size_t size, std::size_t shift) {
-    CoupledPassage coupled;
     const double before = work_.seconds();
-    if (several_gaits())
-      coupled =
-          coupled_passage(mesh, start_, gait_classes(mesh, study_.gaits.states, frames_), study_.gaits.states.size());
-    else
-      coupled.passage = mesh_passage(mesh, start_);
+    CoupledPassage coupled = passage_of(mesh);
     MeshPassage& passage = coupled.passage;
     steps_[shift][size] = std::log(passage.steps);
     rates_[shift][size] = std::log(passage.failure_rate);
@@ -334,8 +333,11 @@ class Run {
     if (size + 1 < sizes_) return mesh.bytes();
     study_.mixing_steps = passage.mixing_steps;
     study_.survival = std::move(passage.survival);
-    tail_rate_ = several_gaits() ? coupled.first_rate : passage.failure_rate;
-    study_.gait_share = std::move(coupled.share);
+    tail_rate_ = coupled.first_rate;
+    if (several_gaits()) {
+      study_.gait_share = std::move(coupled.share);
+      study_.gait_failures = failures_by_gait(mesh, start_, passage.visits, study_.gaits.orbits, frames_);
+    }
     study_.cheapest_failure = mesh.cheapest_failure();
     return mesh.bytes();
   }
@@ -431,11 +433,11 @@ class Run {
       study_.no_simulated = "not asked for";
       return;
     }
-    if (trials < fewest_trials || !walks_know_all()) {
+    if (trials < fewest_trials || several_gaits()) {
       const std::size_t walks = std::clamp<std::size_t>(options_.simulated_steps, 2, walk_count);
       count(walks, std::floor(least_counted_share * allowed / static_cast<double>(walks)));
       study_.no_simulated =
-          (!walks_know_all() ? "it would know one gait; " : "too few trials would fail; ") + count_text(*study_.walks);
+          (several_gaits() ? "it would know one gait; " : "too few trials would fail; ") + count_text(*study_.walks);
       return;
     }
     std::vector<std::uint64_t> steps;
@@ -459,15 +461,14 @@ class Run {
     if (options_.guided_samples == 0) study_.no_guided = "not asked for";
     if (options_.guided_samples > 0 && study_.steps.value <= sampled_from)
       study_.no_guided = "not asked: failures are too frequent";
-    if (several_gaits())
-      study_.no_guided =
-          walks_know_all() ? "its samples would know one order of the gait" : "its samples would know one gait";
+    if (several_gaits()) study_.no_guided = "its samples would know one gait";
     if (!study_.no_guided.empty()) return;
     if (!guide_) guide_ = std::make_unique<Mesh>(map_, frames_, start_, mesh_options(1, 0));
     // It goes from the start to where failures keep their share: the time to forget the start, some times over. A
     // window too short to reach the failures from an ordinary state leaves the weight to a few rare ones, which few
     // samples meet: the rate comes out too low. So it is lengthened until the weights are even.
-    const int forgets = forgetting_steps(study_.mixing_steps);
+    const int forgets = forgetting_steps(std::min(study_.mixing_steps, steps_to_the_orbit()));
+    const BatchMap turns = over_revolutions(map_, static_cast<int>(own_.size()));
     GuidedRate guided;
     double even = 0;
     for (int window = std::min(forgets, longest_window); even < least_even_share;
@@ -477,7 +478,7 @@ class Run {
         const std::lock_guard lock(mutex_);
         work_.add(guided_stage, guided_rows(forgets, window));
       }
-      guided = guided_failure_rate(map_, *guide_, start_,
+      guided = guided_failure_rate(turns, *guide_, start_,
                                    {.samples = options_.guided_samples,
                                     .burn_in = std::min(2 * forgets, 60000),
                                     .window = window,
@@ -507,6 +508,7 @@ class Run {
   std::span<const double> start_;
   const MeshStudyOptions& options_;
   std::vector<NoiseFrame> frames_;
+  GaitOrbit own_;  ///< states of phase 0, one for each revolution of the gait
   std::size_t sizes_, shifts_;
   int at_once_;                                                ///< meshes
   std::vector<std::vector<double>> steps_, rates_, brackets_;  ///< logs, [shift][size]
@@ -519,10 +521,19 @@ class Run {
   WorkLeft work_;
 };
 
+/// Returns whether nodes of all meshes reach as far as some states of phase 0.
+bool nodes_reach(const BatchMap& map, const std::vector<NoiseFrame>& frames, const GaitOrbit& states,
+                 const MeshStudyOptions& options) {
+  const double finest = (options.spacing > 0 ? options.spacing : coarsest(map.dimension)) / 2;
+  const NodeLattice lattice(frames, finest, {});
+  NodeLattice::Point point{};
+  return std::ranges::all_of(states, [&](const auto& state) { return lattice.locate(0, state.data(), point); });
+}
+
 MeshStudy study_around(const BatchMap& map, std::span<const double> start, const MeshStudyOptions& options,
-                       NoiseFreeOrbit orbit, int period) {
+                       Around around) {
   try {
-    return Run(map, start, options, std::move(orbit), period).run();
+    return Run(map, start, options, std::move(around)).run();
   } catch (const NoFailureFound& error) {
     if (options.simulated_steps == 0) throw;
     const auto [found, fails] = walks_in_words(map, start, walking(options));
@@ -534,6 +545,59 @@ MeshStudy study_around(const BatchMap& map, std::span<const double> start, const
     throw Disagreement(
         fmt::format("{}; {}: no number is given", error.what(), walks_in_words(map, start, walking(options)).first));
   }
+}
+
+Around around_orbit(NoiseFreeOrbit orbit) {
+  std::vector<NoiseFrame> frames = orbit.frames;
+  GaitOrbit own{frames.front().centre};
+  return {.orbit = std::move(orbit), .frames = std::move(frames), .own = std::move(own)};
+}
+
+Around around_walk(NoiseFreeWalk walk) {
+  return {.orbit = {walk.frames, {}},
+          .period = 0,
+          .fails_without_noise = walk.fails_after,
+          .frames = walk.frames,
+          .own = {walk.frames.front().centre}};
+}
+
+/// Returns nothing where walks that are pushed off the orbit do not come back.
+std::optional<NoiseFreeOrbit> orbit_over(const BatchMap& map, const PeriodicGait& gait) {
+  try {
+    return noise_free_orbit(over_revolutions(map, gait.period), gait.state);
+  } catch (const NoOrbit&) {
+    return std::nullopt;
+  }
+}
+
+/// Returns the frames of one mesh that holds all turns of a gait. Those of the last steps' response are as fine as
+/// shifts need; in three and four dimensions their nodes fill the memory, and the mean stationary ones are taken.
+/// @param frames  stationary, turn by turn
+std::vector<NoiseFrame> frames_of_turns(const BatchMap& map, const std::vector<NoiseFrame>& frames,
+                                        std::span<const double> on_it) {
+  if (map.dimension <= 2)
+    if (auto walk = noise_free_walk(map, on_it)) return std::move(walk->frames);
+  return common_frames(frames, map.phases);
+}
+
+MeshStudy study_of_gait(const BatchMap& map, std::span<const double> start, const MeshStudyOptions& options,
+                        NoiseFreeOrbit orbit, int period) {
+  Around around = around_orbit(std::move(orbit));
+  around.period = period;
+  if (period == 1) return study_around(map, start, options, std::move(around));
+  GaitOrbit turns;
+  for (std::size_t k = 0; k < around.frames.size(); k += static_cast<std::size_t>(map.phases))
+    turns.push_back(around.frames[k].centre);
+  std::vector<NoiseFrame> frames = frames_of_turns(map, around.frames, turns.front());
+  if (!nodes_reach(map, frames, turns, options)) {
+    if (around.frames.size() > most_phases)
+      throw MapError(
+          fmt::format("return map: its gait of {} revolutions is too wide for the nodes of one mesh", period));
+    return study_around(over_revolutions(map, period), start, options, std::move(around));
+  }
+  around.frames = std::move(frames);
+  around.own = std::move(turns);
+  return study_around(map, start, options, std::move(around));
 }
 
 }  // namespace
@@ -554,17 +618,15 @@ MeshStudy mesh_study(const BatchMap& map, std::span<const double> start, const M
   if (options.shifts < 6)
     throw std::invalid_argument(fmt::format("mesh study: {} shifts, 6 or more expected", options.shifts));
   try {
-    return study_around(map, start, options, noise_free_orbit(map, start), 1);
+    return study_around(map, start, options, around_orbit(noise_free_orbit(map, start)));
   } catch (const NoOrbit& error) {
-    if (const auto gait = periodic_gait(map, start)) {
-      const BatchMap longer = over_revolutions(map, gait->period);
-      std::optional<NoiseFreeOrbit> orbit;
-      try {
-        orbit = noise_free_orbit(longer, gait->state);
-      } catch (const NoOrbit&) {  // it does not hold walks that are pushed off it either
+    if (const auto gait = periodic_gait(map, start))
+      if (auto orbit = orbit_over(map, *gait))
+        return study_of_gait(map, start, options, std::move(*orbit), gait->period);
+    if (auto walk = noise_free_walk(map, start)) try {
+        return study_around(map, start, options, around_walk(std::move(*walk)));
+      } catch (const NoFailureFound&) {  // nor is it a question about first passage
       }
-      if (orbit) return study_around(longer, start, options, std::move(*orbit), gait->period);
-    }
     if (options.simulated_steps == 0) throw;
     std::string walked;
     try {

@@ -53,9 +53,13 @@ struct MeshStudy {
   std::vector<double> survival;  ///< as MeshPassage's, of the finest mesh's first shift
   double cheapest_failure = 0;
   NoiseFreeOrbit orbit;  ///< of a gait that comes back after several revolutions, over all of them
-  int period = 1;        ///< revolutions after which the gait comes back
+  int period = 1;        ///< revolutions after which the gait comes back; 0: there is none, `orbit` has no eigenvalues
+  std::uint64_t fails_without_noise = 0;  ///< where there is no gait, the steps after which that is; 0: never
+  std::vector<NoiseFrame> frames;         ///< of the meshes, phase by phase
   OtherGaits gaits;
-  std::vector<double> gait_share;  ///< of the expected steps, by gait, the start's own first; empty: there is no other
+  /// Hold shares of the expected steps, and of the failures by the gait that they come from (failures_by_gait),
+  /// by gait, the start's own first; empty: there is no other.
+  std::vector<double> gait_share, gait_failures;
   /// Holds the relative parts of the interval of `steps`: the shifts' t-interval, what is left of the discretization,
   /// and what leaves the mesh.
   double shift_error = 0, discretization_error = 0, bracket = 0;
@@ -88,7 +92,10 @@ class Disagreement : public std::runtime_error {
 
 /// Meshes lie around the start's noise-free orbit. An unstable one leads without noise to another gait, which may come
 /// back after several revolutions (periodic_gait): meshes lie around that one then, and steps are counted from the
-/// start all the same.
+/// start all the same. An orbit of several revolutions is held by one mesh with a common frame, on which the noise
+/// shifts it against itself as it may; survivors are then watched over as many revolutions. Only where nodes do not
+/// reach so far each revolution has a mesh of its own, and no shift is seen. A start that leads to no such orbit
+/// (noise_free_walk) is asked for its first passage alone: other gaits are not looked for.
 ///
 /// Solves `sizes` meshes of `shifts` shifts each, extrapolates ln T to spacing 0 (h^2 and h^4, with four sizes h^6) for
 /// each shift by itself. The interval joins, as a root of squares, the t-interval over the shifts and the

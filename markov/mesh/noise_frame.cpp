@@ -22,10 +22,11 @@ constexpr double orbit_tolerance = 1e-11;
 constexpr double same_state = 1e-7;         // of states that are still led to it
 constexpr double period_tolerance = 1e-11;  // of a state that has come back
 constexpr int least_revolutions =
-    300;                            // before a gait counts as reached: a way away from an unstable one begins slowly
-constexpr double nudge = 1e-6;      // beside a start, relative
-constexpr double jump_ratio = 3;    // derivative over the change from -1 to 1 sd, beyond which the map jumps
-constexpr double narrowest = 0.05;  // of the widest axis: nodes there are no nearer
+    300;                               // before a gait counts as reached: a way away from an unstable one begins slowly
+constexpr int walk_revolutions = 300;  // of a walk whose orbit does not count
+constexpr double nudge = 1e-6;         // beside a start, relative
+constexpr double jump_ratio = 3;       // derivative over the change from -1 to 1 sd, beyond which the map jumps
+constexpr double narrowest = 0.05;     // of the widest axis: nodes there are no nearer
 
 /// Steps a map once. What is wrong with a failure there is said by `when`.
 class Probe {
@@ -151,9 +152,41 @@ std::vector<double> row_major(const MatrixXd& m) {
   return out;
 }
 
-}  // namespace
+/// Returns the frame around a state in which a covariance is the unit matrix, but for axes that are too narrow.
+NoiseFrame frame_of(const VectorXd& centre, const MatrixXd& covariance) {
+  const VectorXd sd = covariance.diagonal().cwiseSqrt();
+  if (!(sd.minCoeff() > 0)) throw MapError("return map: the noise does not move every number of the state");
+  const MatrixXd correlation = sd.cwiseInverse().asDiagonal() * covariance * sd.cwiseInverse().asDiagonal();
+  const SymmetricEigen eigen = symmetric_eigen(correlation);
+  const VectorXd widths = eigen.values.reverse().cwiseMax(0).cwiseSqrt();
+  const VectorXd used = widths.cwiseMax(narrowest * widths[0]);
+  const MatrixXd axes = sd.asDiagonal() * eigen.vectors.rowwise().reverse() * used.asDiagonal();
+  return {{centre.begin(), centre.end()}, row_major(axes), row_major(inverse_of(axes)), {widths.begin(), widths.end()}};
+}
 
-namespace {
+using RowMajor = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
+
+/// Sums up the inverse covariances of responses.
+struct MeanResponse {
+  VectorXd first;
+  MatrixXd inverses;
+  double count = 0;
+  void add(const VectorXd& state, const MatrixXd& covariance) {
+    const NoiseFrame frame = frame_of(state, covariance);
+    const Eigen::Map<const RowMajor> inverse(frame.inverse.data(), state.size(), state.size());
+    if (count++ == 0) {
+      first = state;
+      inverses = MatrixXd::Zero(state.size(), state.size());
+    }
+    inverses += inverse.transpose() * inverse;
+  }
+};
+
+/// Returns a state right beside a start: an orbit that is one itself may be unstable.
+VectorXd beside(const BatchMap& map, std::span<const double> start) {
+  VectorXd state = Eigen::Map<const VectorXd>(start.data(), map.dimension);
+  return state + nudge * (state.cwiseAbs() + VectorXd::Constant(map.dimension, nudge));
+}
 
 // Returns after how many revolutions a state has come back, 0 for none.
 int first_return(const std::deque<VectorXd>& before, const VectorXd& state, double tolerance) {
@@ -168,8 +201,7 @@ int first_return(const std::deque<VectorXd>& before, const VectorXd& state, doub
 std::optional<PeriodicGait> periodic_gait(const BatchMap& map, std::span<const double> start) {
   const Probe probe(map);
   const VectorXd quiet = VectorXd::Zero(map.scores);
-  VectorXd state = Eigen::Map<const VectorXd>(start.data(), map.dimension);
-  state += nudge * (state.cwiseAbs() + VectorXd::Constant(map.dimension, nudge));
+  VectorXd state = beside(map, start);
   std::deque<VectorXd> before;  // the last states at phase 0, the latest first
   try {
     for (int revolution = 0; revolution < revolution_limit; ++revolution) {
@@ -184,6 +216,58 @@ std::optional<PeriodicGait> periodic_gait(const BatchMap& map, std::span<const d
   } catch (const MapError&) {  // it ends there: there is no gait to find
   }
   return std::nullopt;
+}
+
+std::vector<NoiseFrame> common_frames(const std::vector<NoiseFrame>& frames, int phases) {
+  std::vector<NoiseFrame> common;
+  for (std::size_t phase = 0; phase < static_cast<std::size_t>(phases); ++phase) {
+    const std::vector<double>& centre = frames[phase].centre;
+    const auto d = static_cast<Index>(centre.size());
+    MatrixXd sum = MatrixXd::Zero(d, d);
+    for (std::size_t k = phase; k < frames.size(); k += static_cast<std::size_t>(phases)) {
+      const Eigen::Map<const RowMajor> axes(frames[k].axes.data(), d, d);
+      sum += axes * axes.transpose();
+    }
+    const double count = static_cast<double>(frames.size()) / phases;
+    common.push_back(frame_of(Eigen::Map<const VectorXd>(centre.data(), d), sum / count));
+  }
+  return common;
+}
+
+std::optional<NoiseFreeWalk> noise_free_walk(const BatchMap& map, std::span<const double> start) {
+  require_start(map, start);
+  const auto phases = static_cast<std::size_t>(map.phases), kept = static_cast<std::size_t>(map.dimension) * phases;
+  const std::vector<double> quiet(static_cast<std::size_t>(map.scores), 0.0);
+  NoiseFreeWalk walk;
+  std::vector<MeanResponse> met(phases);
+  std::vector<Derivatives> last;  // of the steps that led here, the latest last
+  VectorXd state = beside(map, start);
+  for (std::size_t step = 0; step < walk_revolutions * phases && walk.fails_after == 0; ++step) {
+    const int phase = static_cast<int>(step % phases);
+    if (last.size() == kept) {
+      MatrixXd covariance = MatrixXd::Zero(map.dimension, map.dimension);
+      for (const Derivatives& d : last)
+        covariance = d.by_state * covariance * d.by_state.transpose() + d.by_scores * d.by_scores.transpose();
+      if (covariance.diagonal().minCoeff() > 0) met[step % phases].add(state, covariance);
+      last.erase(last.begin());
+    }
+    try {
+      last.push_back(derivatives(map, phase, state));
+    } catch (const NoOrbit&) {  // it fails right beside this state
+      last.clear();
+    }
+    VectorXd next(map.dimension);
+    std::uint8_t failed = 0;
+    map.step(phase, {state.data(), start.size()}, quiet, {next.data(), start.size()}, {&failed, 1});
+    if (!failed && !is_landing(map, (phase + 1) % map.phases, {next.data(), start.size()})) return std::nullopt;
+    if (failed) walk.fails_after = step + 1;
+    state = next;
+  }
+  for (const MeanResponse& response : met) {
+    if (response.count == 0) return std::nullopt;
+    walk.frames.push_back(frame_of(response.first, inverse_of(response.inverses / response.count)));
+  }
+  return walk;
 }
 
 BatchMap over_revolutions(const BatchMap& map, int revolutions) {
@@ -238,19 +322,7 @@ NoiseFreeOrbit noise_free_orbit(const BatchMap& map, std::span<const double> sta
   for (int r = 0; r < revolutions; ++r) {
     for (int phase = 0; phase < map.phases; ++phase) {
       const auto p = static_cast<std::size_t>(phase);
-      if (r + 1 == revolutions) {
-        const VectorXd sd = covariance.diagonal().cwiseSqrt();
-        if (!(sd.minCoeff() > 0)) throw MapError("return map: the noise does not move every number of the state");
-        const MatrixXd correlation = sd.cwiseInverse().asDiagonal() * covariance * sd.cwiseInverse().asDiagonal();
-        const SymmetricEigen eigen = symmetric_eigen(correlation);
-        const VectorXd widths = eigen.values.reverse().cwiseMax(0).cwiseSqrt();
-        const VectorXd used = widths.cwiseMax(narrowest * widths[0]);
-        const MatrixXd axes = sd.asDiagonal() * eigen.vectors.rowwise().reverse() * used.asDiagonal();
-        frames[p].centre.assign(orbit[p].begin(), orbit[p].end());
-        frames[p].axes = row_major(axes);
-        frames[p].inverse = row_major(inverse_of(axes));
-        frames[p].sds.assign(widths.begin(), widths.end());
-      }
+      if (r + 1 == revolutions) frames[p] = frame_of(orbit[p], covariance);
       covariance = a[p] * covariance * a[p].transpose() + q[p];
     }
   }

@@ -3,6 +3,7 @@
 
 #include <array>
 #include <complex>
+#include <cstdint>
 #include <optional>
 #include <span>
 #include <vector>
@@ -60,6 +61,23 @@ struct PeriodicGait {
 /// Finds where the map leads without noise from right beside `start`, 1e-6 of it away: an orbit that is a start itself
 /// may be unstable. Returns nothing where that fails within 5000 revolutions, or has no period up to longest_period.
 std::optional<PeriodicGait> periodic_gait(const BatchMap& map, std::span<const double> start);
+
+/// Returns one frame for each of the first `phases` of frames that follow one another in turns: of the mean of their
+/// covariances, around the centre of the first.
+std::vector<NoiseFrame> common_frames(const std::vector<NoiseFrame>& frames, int phases);
+
+/// A walk without noise, wherever it leads.
+struct NoiseFreeWalk {
+  std::vector<NoiseFrame> frames;  ///< one for each phase, around the first of its states that has one
+  std::uint64_t fails_after = 0;   ///< steps; 0: it does not fail
+};
+
+/// Follows the map without noise from right beside `start`, for 300 revolutions or to its failure. A frame holds all
+/// states of its phase: it is that of the response to the noise of the last steps, as many as the state has numbers,
+/// with the mean of the inverse covariances, so that it is as narrow as they are. What stretches without end has no
+/// stationary response, and of an orbit of several revolutions that would be wider than what a shift bends.
+/// Returns nothing where no step of the walk has a derivative, or one leads where the map is not defined.
+std::optional<NoiseFreeWalk> noise_free_walk(const BatchMap& map, std::span<const double> start);
 
 /// Returns the map watched over so many of its revolutions: of the phases of one come those of the next.
 BatchMap over_revolutions(const BatchMap& map, int revolutions);

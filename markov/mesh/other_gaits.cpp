@@ -49,7 +49,7 @@ class Search {
   }
 
   /// Follows states for so many revolutions without noise; those that fail or come near the gaits are dropped.
-  void relax(std::vector<State>& states, int revolutions, const std::vector<std::vector<State>>& gaits) const {
+  void relax(std::vector<State>& states, int revolutions, const std::vector<GaitOrbit>& gaits) const {
     std::vector<double> scores;
     for (int r = 0; r < revolutions && !states.empty(); ++r) {
       for (int phase = 0; phase < map_.phases; ++phase) {
@@ -60,8 +60,8 @@ class Search {
     }
   }
 
-  bool known(const State& state, const std::vector<std::vector<State>>& gaits) const {
-    return std::any_of(gaits.begin(), gaits.end(), [&](const std::vector<State>& orbit) {
+  bool known(const State& state, const std::vector<GaitOrbit>& gaits) const {
+    return std::any_of(gaits.begin(), gaits.end(), [&](const GaitOrbit& orbit) {
       return std::any_of(orbit.begin(), orbit.end(),
                          [&](const State& at) { return distance(state, at) < near_distance; });
     });
@@ -79,8 +79,8 @@ class Search {
     states = std::move(kept);
   }
 
-  std::vector<State> orbit(const State& state) const {
-    std::vector<State> all{state}, at{state};
+  GaitOrbit orbit(const State& state) const {
+    GaitOrbit all{state}, at{state};
     for (int r = 1; r < orbit_length; ++r) {
       relax(at, 1, {});
       if (at.empty() || distance(at.front(), state) < 1e-3) break;
@@ -161,13 +161,13 @@ struct Ways {
   double failure = 0;
 };
 
-Ways ways_from(const BatchMap& map, const std::vector<NoiseFrame>& frames, const std::vector<State>& gaits,
+Ways ways_from(const BatchMap& map, const std::vector<NoiseFrame>& frames, const std::vector<GaitOrbit>& gaits,
                std::size_t from, MeshOptions options) {
-  options.targets = gaits;
-  options.targets.erase(options.targets.begin() + static_cast<std::ptrdiff_t>(from));
+  for (std::size_t g = 0; g < gaits.size(); ++g)
+    if (g != from) options.targets.push_back(gaits[g].front());
   const NodeLattice lattice = mesh_lattice(map, frames, options);
   MeshGrowth growth(map, lattice, options);
-  growth.grow_from_state(gaits[from]);
+  growth.grow_from_state(gaits[from].front());
   Ways ways{{}, growth.cheapest_failure()};
   ways.to = growth.target_actions();
   ways.to.insert(ways.to.begin() + static_cast<std::ptrdiff_t>(from), 0.0);
@@ -177,7 +177,7 @@ Ways ways_from(const BatchMap& map, const std::vector<NoiseFrame>& frames, const
 }  // namespace
 
 MeshOptions with_gaits(MeshOptions options, const OtherGaits& gaits) {
-  if (gaits.states.size() < 2) return options;
+  if (gaits.orbits.size() < 2) return options;
   options.score_reach = far_reach;
   options.sources = gaits.sources;
   options.start_action = gaits.start_action;
@@ -185,32 +185,29 @@ MeshOptions with_gaits(MeshOptions options, const OtherGaits& gaits) {
   return options;
 }
 
-OtherGaits find_other_gaits(const BatchMap& map, const std::vector<NoiseFrame>& frames, std::span<const double> start,
-                            const Mesh& mesh, const MeshOptions& options) {
+OtherGaits find_other_gaits(const BatchMap& map, const std::vector<NoiseFrame>& frames, const GaitOrbit& own,
+                            std::span<const double> start, const Mesh& mesh, const MeshOptions& options) {
   const Search search(map, frames);
-  std::vector<std::vector<State>> orbits{{frames.front().centre}};
+  std::vector<GaitOrbit> orbits{own};
   std::vector<State> strays = search.seeds(start, mesh, options.seed);
   search.relax(strays, first_revolutions, orbits);
   search.thin(strays);
   search.relax(strays, more_revolutions, orbits);
-  OtherGaits found;
-  found.states.push_back(frames.front().centre);
   for (const State& stray : strays) {
     if (search.known(stray, orbits)) continue;
     if (orbits.size() > most_gaits)
       throw MapError(
           fmt::format("return map: it has more than {} other gaits, as at {}", most_gaits, describe_state(map, stray)));
     orbits.push_back(search.orbit(stray));
-    found.states.push_back(stray);
   }
-  if (found.states.size() == 1) return found;
+  if (orbits.size() == 1) return {.orbits = orbits};
+  OtherGaits found;
   std::vector<Ways> ways;
-  for (std::size_t g = 0; g < found.states.size(); ++g)
-    ways.push_back(g == 0 || ways.front().to[g] <= MeshGrowth::farthest
-                       ? ways_from(map, frames, found.states, g, options)
-                       : Ways{});
+  for (std::size_t g = 0; g < orbits.size(); ++g)
+    ways.push_back(g == 0 || ways.front().to[g] <= MeshGrowth::farthest ? ways_from(map, frames, orbits, g, options)
+                                                                        : Ways{});
   std::vector<double> limit(ways.size(), 0.0);
-  std::vector<State> reached;
+  std::vector<GaitOrbit> reached;
   for (std::size_t g = 0; g < ways.size(); ++g) {
     if (!(ways.front().to[g] <= MeshGrowth::farthest)) continue;  // the noise does not lead there
     for (std::size_t h = 0; h < ways.size(); ++h)
@@ -222,17 +219,17 @@ OtherGaits find_other_gaits(const BatchMap& map, const std::vector<NoiseFrame>& 
           "the noise leads within an action of {:.3g} to another gait, at {}, from which neither a failure nor a way "
           "back "
           "is found within an action of {:.3g}",
-          ways.front().to[g], describe_state(map, found.states[g]), MeshGrowth::farthest);
+          ways.front().to[g], describe_state(map, orbits[g].front()), MeshGrowth::farthest);
     limit[g] += options.margin;
     found.limit = std::max(found.limit, limit[g]);
-    reached.push_back(found.states[g]);
+    reached.push_back(orbits[g]);
   }
-  if (reached.size() == 1) return {.states = reached};
+  if (reached.size() == 1) return {.orbits = reached};
   found.start_action = found.limit - limit.front();
   for (std::size_t g = 1; g < ways.size(); ++g)
     if (limit[g] > 0)
       for (const State& at : orbits[g]) found.sources.push_back({at, found.limit - limit[g]});
-  found.states = std::move(reached);
+  found.orbits = std::move(reached);
   return found;
 }
 

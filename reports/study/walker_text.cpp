@@ -48,7 +48,10 @@ WalkerJson mesh_study_json(const std::string& name, const markov::MeshStudy& s) 
         {{"spacing", size.spacing}, {"nodes", size.nodes}, {"entries", size.entries}, {"steps", size.steps}});
   WalkerJson gaits = WalkerJson::array();
   for (std::size_t g = 1; g < s.gait_share.size(); ++g)
-    gaits.push_back({{"state", s.gaits.states[g]}, {"share_of_steps", s.gait_share[g]}});
+    gaits.push_back({{"state", s.gaits.orbits[g].front()},
+                     {"period", s.gaits.orbits[g].size()},
+                     {"share_of_steps", s.gait_share[g]},
+                     {"share_of_failures", s.gait_failures[g]}});
   const MeshEstimate regime = markov::steps_from_quasi_stationary(s);
   WalkerJson steps = mesh_estimate_json(s.steps);
   steps["from_quasi_stationary"] = regime.value;
@@ -74,9 +77,16 @@ WalkerJson mesh_study_json(const std::string& name, const markov::MeshStudy& s) 
           {"memory_bytes", s.expected_bytes}};
 }
 
-// Tells of the orbit around which a mesh lies; where it has several phases, of each.
+// Tells of the orbit around which a mesh lies; where it has several phases, of each. Period 0: there is none.
 WalkerJson orbit_json(const std::vector<std::string>& names, const markov::MeshStudy& study) {
   const std::vector<markov::NoiseFrame>& frames = study.orbit.frames;
+  if (study.period == 0)
+    return {{"names", names},
+            {"state", nullptr},
+            {"eigenvalues", WalkerJson::array()},
+            {"period", 0},
+            {"fails_without_noise_after",
+             study.fails_without_noise > 0 ? WalkerJson(study.fails_without_noise) : WalkerJson(nullptr)}};
   WalkerJson json = {{"names", names},
                      {"state", frames.front().centre},
                      {"eigenvalues", eigenvalues_json(study.orbit.eigenvalues)},
@@ -89,7 +99,7 @@ WalkerJson orbit_json(const std::vector<std::string>& names, const markov::MeshS
 
 WalkerJson walker_study_json(const WalkerSetting& setting, const WalkerStudy& study) {
   WalkerJson json = mesh_study_json(setting.describe(), study.passage);
-  if (study.passage.period > 1)
+  if (study.passage.period != 1)
     json["gait"] = orbit_json(setting.map().names(), study.passage);
   else
     json["gait"] = {{"names", setting.map().names()},
@@ -131,8 +141,9 @@ Lines head_lines(const markov::MeshStudy& s) {
 Lines mesh_lines(const markov::MeshStudy& s) {
   Lines lines;
   for (std::size_t g = 1; g < s.gait_share.size(); ++g)
-    lines.emplace_back("another gait", fmt::format("at {:.6g}: {:.3g} of the steps", fmt::join(s.gaits.states[g], ", "),
-                                                   s.gait_share[g]));
+    lines.emplace_back("another gait",
+                       fmt::format("at {:.6g}: {:.3g} of the steps, {:.3g} of the failures",
+                                   fmt::join(s.gaits.orbits[g].front(), ", "), s.gait_share[g], s.gait_failures[g]));
   lines.emplace_back("relative errors", fmt::format("shifts {:.2g}, discretization {:.2g}, leaving the mesh {:.2g}",
                                                     s.shift_error, s.discretization_error, s.bracket));
   const double blind = std::max(s.blind_spots.missed, s.blind_spots.imagined);
@@ -152,6 +163,13 @@ std::string lines_text(const std::string& head, const Lines& lines) {
 
 // Tells of the orbit around which a mesh lies; of one of several phases, of each.
 void add_orbit_lines(Lines& lines, const std::vector<std::string>& names, const markov::MeshStudy& study) {
+  if (study.period == 0) {
+    lines.emplace_back("gait",
+                       study.fails_without_noise > 0
+                           ? fmt::format("none: without noise it fails after {} steps", study.fails_without_noise)
+                           : std::string("none: without noise it comes to no orbit"));
+    return;
+  }
   if (study.period > 1) lines.emplace_back("gait: period", fmt::format("{} steps", study.orbit.frames.size()));
   for (std::size_t phase = 0; phase < study.orbit.frames.size(); ++phase)
     for (std::size_t k = 0; k < names.size(); ++k)
@@ -164,7 +182,7 @@ void add_orbit_lines(Lines& lines, const std::vector<std::string>& names, const 
 std::string study_lines(const WalkerSetting& setting, const WalkerStudy& study) {
   Lines lines = head_lines(study.passage);
   const std::vector<std::string> names = setting.map().names();
-  if (study.passage.period > 1) {
+  if (study.passage.period != 1) {
     add_orbit_lines(lines, names, study.passage);
   } else {
     for (std::size_t k = 0; k < study.gait.state.size(); ++k)

@@ -21,6 +21,8 @@ const WalkerSetting garcia{Walker::simplest, 0.009 / degree, 0.0015 / degree, dy
 markov::MeshStudy meshed(const markov::BatchMap& map, std::span<const double> start, double spacing) {
   markov::MeshStudy study;
   study.orbit = markov::noise_free_orbit(map, start);
+  study.frames = study.orbit.frames;
+  study.gaits.orbits = {{study.frames.front().centre}};
   study.sizes.resize(2);
   study.sizes[1].spacing = spacing;
   return study;

@@ -71,6 +71,18 @@ inline BatchMap cubic_batch(double sd) {
   return map;
 }
 
+/// The logistic map x' = r x (1 - x) + sd z, failed outside (0, high).
+inline BatchMap logistic_batch(double r, double sd, double high = 1) {
+  BatchMap map;
+  map.step = [=](int, auto states, auto scores, auto next, auto failed) {
+    for (std::size_t i = 0; i < failed.size(); ++i) {
+      next[i] = r * states[i] * (1 - states[i]) + sd * scores[i];
+      failed[i] = !(next[i] > 0 && next[i] < high);
+    }
+  };
+  return map;
+}
+
 /// Returns the expected steps of the linear map from x, by Gauss-Legendre quadrature of its density.
 inline double linear_steps(double sd, double x) {
   const LinearWithDensity map{{.sd = sd}};

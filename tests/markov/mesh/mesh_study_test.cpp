@@ -3,12 +3,15 @@
 #include <gtest/gtest.h>
 
 #include <Eigen/LU>
+#include <array>
 #include <cmath>
 #include <cstdint>
 #include <numbers>
 #include <utility>
 
 #include "markov/mesh/batch_simulation.h"
+#include "markov/mesh/score_lattice.h"
+#include "markov/transition_rows/draws.h"
 #include "tests/markov/mesh/maps.h"
 #include "tests/message_of.h"
 
@@ -17,22 +20,41 @@ namespace {
 
 using namespace testing;  // maps.h
 
-// Returns the expected steps of the cubic map from x, by the midpoint rule on `nodes` of [-2, 2].
-double cubic_steps(double sd, double x, int nodes) {
-  const double width = 4.0 / nodes;
-  const auto density = [&](double from, double to) {
-    const double z = (to - cubic(from)) / sd;
-    return std::exp(-0.5 * z * z) / (sd * std::sqrt(2 * std::numbers::pi)) * width;
-  };
-  const Eigen::ArrayXd at = Eigen::ArrayXd::LinSpaced(nodes, -2 + width / 2, 2 - width / 2);
-  Eigen::MatrixXd left = Eigen::MatrixXd::Identity(nodes, nodes);
-  for (Eigen::Index i = 0; i < nodes; ++i)
-    for (Eigen::Index j = 0; j < nodes; ++j) left(i, j) -= density(at[i], at[j]);
-  const Eigen::VectorXd steps = left.partialPivLu().solve(Eigen::VectorXd::Ones(nodes));
-  double mean = 1;
-  for (Eigen::Index j = 0; j < nodes; ++j) mean += density(x, at[j]) * steps[j];
-  return mean;
-}
+// A map mean(x) + sd z on an interval, integrated by Gauss's four points on even panels.
+struct Quadrature {
+  double steps = 0;  // expected, from a state
+  double rate = 0;   // of failing in a step, of those that have walked on for ever
+
+  template <class Mean>
+  Quadrature(Mean mean, double sd, double low, double high, double from, int panels) {
+    const Eigen::Index nodes = 4 * panels;
+    Eigen::ArrayXd at(nodes), weight(nodes);
+    for (Eigen::Index k = 0; k < nodes; ++k) {
+      constexpr std::array<double, 4> point{-0.8611363115940526, -0.3399810435848563, 0.3399810435848563,
+                                            0.8611363115940526};
+      const double half = (high - low) / panels / 2, outer = 0.3478548451374538;
+      at[k] = low + half * (2 * static_cast<double>(k / 4) + 1 + point[static_cast<std::size_t>(k % 4)]);
+      weight[k] = half * (k % 4 == 0 || k % 4 == 3 ? outer : 1 - outer);
+    }
+    const auto mass = [&](double x, Eigen::Index to) {
+      const double z = (at[to] - mean(x)) / sd;
+      return std::exp(-0.5 * z * z) / (sd * std::sqrt(2 * std::numbers::pi)) * weight[to];
+    };
+    const auto tail = [](double z) { return 0.5 * std::erfc(z / std::numbers::sqrt2); };
+    Eigen::MatrixXd left = Eigen::MatrixXd::Identity(nodes, nodes);
+    Eigen::VectorXd first(nodes), kill(nodes);
+    for (Eigen::Index i = 0; i < nodes; ++i) {
+      for (Eigen::Index j = 0; j < nodes; ++j) left(i, j) -= mass(at[i], j);
+      first[i] = mass(from, i);
+      kill[i] = tail((high - mean(at[i])) / sd) + tail((mean(at[i]) - low) / sd);
+    }
+    const Eigen::PartialPivLU<Eigen::MatrixXd> solver(left.transpose());
+    Eigen::VectorXd visits = solver.solve(first);
+    steps = 1 + visits.sum();
+    for (int k = 0; k < 20; ++k) visits = solver.solve(visits / visits.sum());
+    rate = visits.dot(kill) / visits.sum();
+  }
+};
 
 MeshStudyOptions quick() { return {.seed = 2, .guided_samples = 400, .simulated_steps = 100000}; }
 
@@ -91,7 +113,7 @@ TEST(MeshStudy, PhasesAgreeWithSimulation) {
 TEST(MeshStudy, FollowsGaitsThatComeBackAfterTwoSteps) {
   for (const double sd : {0.4, 0.3, 0.25}) {  // 228 to 2.1e4 steps
     const MeshStudy study = mesh_study(cubic_batch(sd), std::vector<double>{0}, quick());
-    const double exact = cubic_steps(sd, 0, 400);
+    const double exact = Quadrature(cubic, sd, -2, 2, 0, 50).steps;
     EXPECT_EQ(study.period, 2);
     EXPECT_EQ(study.disagreement, "");
     EXPECT_NEAR(std::abs(study.orbit.frames[0].centre[0]), 1, 1e-9);
@@ -100,6 +122,86 @@ TEST(MeshStudy, FollowsGaitsThatComeBackAfterTwoSteps) {
     EXPECT_GE(study.steps.upper, exact * 0.9995) << sd;
     EXPECT_EQ(study.simulated.has_value(), sd == 0.4);  // by 100,000 steps
   }
+}
+
+// The noise shifts these orbits of two, four and eight steps against themselves, often or hardly ever: each is one
+// gait. At r = 3.8 and 4.1 there is none, and without noise the latter fails.
+TEST(MeshStudy, HoldsOrbitsThatTheNoiseShiftsAndWalksWithoutAny) {
+  struct Case {
+    double r, sd, high, start;
+    int period, panels;
+  };
+  for (const Case& c : {Case{3.2, 0.08, 1, 0.5, 2, 40},
+                        {3.5, 0.08, 1, 0.5, 4, 40},
+                        {3.5, 0.04, 1, 0.5, 4, 60},
+                        {3.55, 0.04, 1, 0.5, 8, 60},
+                        {3.2, 0.012, 0.85, 0.5, 2, 120},
+                        {3.8, 0.02, 1, 0.5, 0, 80},
+                        {4.1, 0.01, 1, 0.3, 0, 120}}) {
+    const std::vector<double> start{c.start};
+    const MeshStudy study = mesh_study(logistic_batch(c.r, c.sd, c.high), start, quick());
+    const Quadrature exact([&](double x) { return c.r * x * (1 - x); }, c.sd, 0, c.high, c.start, c.panels);
+    EXPECT_EQ(study.disagreement, "") << c.r;
+    EXPECT_EQ(study.period, c.period);
+    EXPECT_EQ(study.fails_without_noise > 0, c.r > 4);
+    EXPECT_EQ(study.gaits.orbits.size(), 1u);
+    EXPECT_NEAR(study.steps.value / exact.steps, 1, 0.003) << c.r << ' ' << c.sd;
+    EXPECT_NEAR(study.failure_rate.value / exact.rate, 1, 0.004) << c.r << ' ' << c.sd;
+    EXPECT_LE(study.steps.lower, exact.steps * 1.001) << c.r << ' ' << c.sd;
+    EXPECT_GE(study.steps.upper, exact.steps * 0.999) << c.r << ' ' << c.sd;
+    EXPECT_LT(study.steps.upper / study.steps.lower, 1.02) << c.r << ' ' << c.sd;
+  }
+}
+
+// Nodes of one mesh number 16384 spacings to either side; turns further apart have meshes of their own.
+TEST(MeshStudy, TurnsFarApartHaveMeshesOfTheirOwn) {
+  BatchMap map;
+  map.step = [](int, auto states, auto scores, auto next, auto failed) {
+    for (std::size_t i = 0; i < failed.size(); ++i) {
+      const double side = states[i] > 0 ? 1000 : -1000;
+      next[i] = -side + 0.5 * (states[i] - side) + 0.01 * scores[i];
+      failed[i] = std::abs(std::abs(next[i]) - 1000) > 0.04;
+    }
+  };
+  const MeshStudy study = mesh_study(map, std::vector<double>{1000}, quick());
+  EXPECT_EQ(study.period, 2);
+  EXPECT_EQ(study.frames.size(), 2U);
+  const Quadrature exact([](double x) { return 0.5 * x; }, 0.01, -0.04, 0.04, 0, 30);
+  EXPECT_NEAR(study.steps.value / exact.steps, 1, 0.003);
+}
+
+// It fails beyond -1.9 and 2.3; a simulated failure is of the gait that its walk was within one sd of last.
+TEST(MeshStudy, SaysFromWhichGaitFailuresCome) {
+  const auto mean = [](double x) { return x * (1.5 - 0.5 * x * x) + 0.05; };
+  BatchMap map;
+  map.step = [mean](int, auto states, auto scores, auto next, auto failed) {
+    for (std::size_t i = 0; i < failed.size(); ++i) {
+      next[i] = mean(states[i]) + 0.35 * scores[i];
+      failed[i] = !(next[i] > -1.9 && next[i] < 2.3);
+    }
+  };
+  const MeshStudy study = mesh_study(map, std::vector<double>{-1}, quick());
+  ASSERT_EQ(study.gait_failures.size(), 2u);
+  const NoiseFrame& frame = study.frames.front();
+  const double low = study.gaits.orbits[0][0][0], high = study.gaits.orbits[1][0][0];
+  std::size_t steps = 0, above = 0, failures = 0, failures_above = 0;
+  for (; failures < 3000; ++failures) {
+    double x = -1;
+    bool last = false;
+    for (std::uint64_t n = 0; x > -1.9 && x < 2.3; ++n, ++steps) {
+      if (std::abs(x - (last ? low : high)) < frame.axes[0]) last = !last;
+      above += last;
+      x = mean(x) + 0.35 * normal_score(uniforms(9, 0, failures, n)[0]);
+    }
+    failures_above += last;
+  }
+  const auto share = [](std::size_t some, std::size_t all) {
+    return static_cast<double>(some) / static_cast<double>(all);
+  };
+  EXPECT_NEAR(study.steps.value, share(steps, failures), 0.08 * study.steps.value);
+  EXPECT_NEAR(study.gait_share[1], share(above, steps), 0.05);
+  EXPECT_NEAR(study.gait_failures[1], share(failures_above, failures), 0.035);
+  EXPECT_GT(std::abs(study.gait_failures[1] - study.gait_share[1]), 0.1);
 }
 
 // Two gaits lie at 1 and -1 beside an unstable start, 0: x' = 3/2 x - x^3 / 2, failed beyond -2 and 2.
@@ -116,7 +218,7 @@ TEST(MeshStudy, FollowsGaitsBesideAnUnstableStart) {
   const auto simulated = simulate_steps(map, start, {.trials = 4000, .seed = 5});
   ASSERT_TRUE(simulated);
   EXPECT_EQ(study.period, 1);
-  EXPECT_EQ(study.gaits.states.size(), 2U);
+  EXPECT_EQ(study.gaits.orbits.size(), 2U);
   EXPECT_NEAR(study.steps.value, simulated->mean, 4 * simulated->standard_error);
 }
 
@@ -203,7 +305,7 @@ TEST(MeshStudy, FollowsSlipsToAnotherGaitHoweverRare) {
     EXPECT_LE(study.steps.lower, 1.003 * exact);
     EXPECT_GE(study.steps.upper, 0.997 * exact);
     EXPECT_LT(study.steps.upper / study.steps.lower, 1.05);
-    EXPECT_EQ(study.gaits.states.size(), 2u);
+    EXPECT_EQ(study.gaits.orbits.size(), 2u);
     EXPECT_FALSE(study.simulated || study.guided);  // they would start in one gait
   }
 }

@@ -164,6 +164,24 @@ class Steps(unittest.TestCase):
         self.assertLess(abs(study.expected_steps.value / 7.207e5 - 1), 0.005)
         self.assertEqual(study.status, "mesh_alone")
         self.assertAlmostEqual(study.other_gaits[0].share_of_steps, 0.5, delta=0.01)
+        self.assertLess(study.other_gaits[0].share_of_failures, 0.01)
+        self.assertIn("of the failures", str(study))
+
+    def test_orbits_of_several_steps_are_one_gait_and_there_may_be_none(self):
+        for r, sd, period, exact in ((3.5, 0.04, 4, 4226.0), (3.8, 0.02, 0, 1602.45)):  # by Nystrom's method
+            def logistic(state, noise):
+                following = r * state * (1 - state) + sd * noise
+                return following, (following[:, 0] <= 0) | (following[:, 0] >= 1)
+
+            study = metastable.walker(logistic, 1, 1, start=[0.5]).study(simulated_steps=20000, how_it_fails=True)
+            self.assertLess(abs(study.expected_steps.value / exact - 1), 0.003)
+            self.assertEqual(study.gait.period, period)
+            self.assertEqual(len(study.other_gaits), 0)
+            self.assertAlmostEqual(sum(study.how_it_fails.by_phase), 1, 6)
+            self.assertEqual(len(study.how_it_fails.by_phase), max(period, 1))
+        self.assertIsNone(study.gait.state)
+        self.assertIsNone(study.gait.fails_without_noise_after)
+        self.assertIn("none: without noise it comes to no orbit", str(study))
 
     def test_what_was_not_asked_for_is_called_so(self):
         study = line(drift).study(spacing=0.4, simulated_steps=0)
