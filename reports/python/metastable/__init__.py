@@ -686,18 +686,18 @@ def walker(step, dimension, noise, *, start, names=(), noise_names=(), phases=1,
                  rows as there are at once, some of which may turn out not to be needed.
     dimension    numbers of a state, 1 to 30; above 4 study() takes method="splitting"
     noise        numbers of noise a step, 1 to 16
-    start        the state that walks begin from, at phase 0: expected steps are counted from it. Without noise the map
-                 has to settle from it into an orbit, the gait, which meshes are centred on and the answer tells
-                 (`gait`); expected steps from the metastable regime, `expected_steps.from_quasi_stationary`, do not
-                 hang on it
+    start        the state that walks begin from, at phase 0: expected steps are counted from it. The orbit that the map
+                 settles into without noise, the gait, is what meshes are centred on and the answer tells (`gait`);
+                 expected steps from the metastable regime, `expected_steps.from_quasi_stationary`, do not hang on it
     names        of the numbers of a state, with units; noise_names likewise
     phases       events after which the map repeats itself
     angles       numbers of the state that are angles [rad], by name or place: they are counted within pi of the
                  start's, and `step` gets them within pi of zero, so that an orbit may lie where they wrap
 
     Where the orbit is unstable, and without noise the map leads on to another one, which may come back after several
-    steps (up to 16), that is the gait. Raises MapError naming the state where a landing is not finite, and where the
-    orbit fails or is unstable and leads to none.
+    steps (up to 16), that is the gait, however the noise shifts it against itself. Where there is none, because the map
+    wanders or fails without noise, the answer is the first passage from the start alone (`gait.period` 0). Raises
+    MapError naming the state where a landing is not finite, and where an unstable orbit leads to no failure.
     """
     return Walker(step, dimension, noise, start, names, noise_names, phases, name, angles)
 
