@@ -69,8 +69,8 @@ TEST(WalkerStudy, GuidedSamplesNeedAWindowThatReachesTheFailures) {
 TEST(WalkerStudy, NamesWhatIsOutOfRange) {
   EXPECT_THROW(study_walker({Walker::compass, -1, 0.5, dynamics::Terrain::fresh}), std::invalid_argument);
   EXPECT_THROW(study_walker({Walker::compass, 3, 0, dynamics::Terrain::fresh}), std::invalid_argument);
-  EXPECT_THROW(study_walker({Walker::compass, 30, 0.5, dynamics::Terrain::fresh}), markov::MapError);     // unstable
-  EXPECT_THROW(study_walker({Walker::simplest, 1.2, 0.01, dynamics::Terrain::fresh}), markov::MapError);  // unstable
+  // Its gait is unstable and leads to a fall: simulation refutes the mesh of so short a walk.
+  EXPECT_NE(study_walker({Walker::compass, 30, 0.5, dynamics::Terrain::fresh}).passage.disagreement, "");
   EXPECT_THROW(walker_from_name("biped"), std::invalid_argument);
   EXPECT_THROW(terrain_from_name("sand"), std::invalid_argument);
 }
