@@ -623,11 +623,11 @@ MeshStudy mesh_study(const BatchMap& map, std::span<const double> start, const M
     if (const auto gait = periodic_gait(map, start))
       if (auto orbit = orbit_over(map, *gait))
         return study_of_gait(map, start, options, std::move(*orbit), gait->period);
+    if (options.simulated_steps == 0) throw;  // without a gait, a mesh alone does not vouch for its nodes
     if (auto walk = noise_free_walk(map, start)) try {
         return study_around(map, start, options, around_walk(std::move(*walk)));
       } catch (const NoFailureFound&) {  // nor is it a question about first passage
       }
-    if (options.simulated_steps == 0) throw;
     std::string walked;
     try {
       walked = walks_in_words(map, start, walking(options)).first;
