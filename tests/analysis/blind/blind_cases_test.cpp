@@ -184,7 +184,7 @@ TEST(EffectPower, GrowsLikeTheSquareOfTheSize) {
   const auto power = [&](const std::string& text) {
     return expected_power(design, {dynamics::effect_from_text(text, paper)}, 4);
   };
-  EXPECT_NEAR(power("leg_contact"), 0, 1e-9);  // neutral
+  EXPECT_NEAR(power("leg_contact:leg=2,friction_ratio=1"), 0, 1e-9);
   for (const auto& [one, two] : {std::pair<std::string, std::string>{"leg_contact:leg=2,friction_ratio=1.06",
                                                                      "leg_contact:leg=2,friction_ratio=1.12"},
                                  {"slope_offset:offset_deg=0.02", "slope_offset:offset_deg=0.04"},
