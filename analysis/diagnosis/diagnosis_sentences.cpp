@@ -320,9 +320,8 @@ std::string next_step(const Diagnosis& d) {
           effects.insert(effects.end(), one.effects.begin(), one.effects.end());
         }
       return fmt::format(
-          "Give the model {}, or take {} out of {}, and diagnose new trials: what stays is then the whole gap and "
-          "shows "
-          "more clearly.",
+          "Give the model {}, or take {} out of {}, and diagnose new trials: what stays is then the whole gap, and it "
+          "shows more clearly.",
           fmt::join(names, " and "), names.size() == 1 ? "it" : "them", taken_out_of(effects));
     }
     case Verdict::unexplained:
