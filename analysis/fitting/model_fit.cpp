@@ -358,12 +358,19 @@ std::vector<double> given_values(const TransitionModel& model) {
 Fit best_fit(const TransitionModel& model, const std::vector<double>& nuisance, const std::vector<EffectTerm>& terms,
              const FitOptions& options) {
   const std::vector<FitStart> starts = model.starts(terms);
-  std::optional<Fit> found;
-  if (std::ranges::none_of(starts, &FitStart::alone)) found = fit(model, nuisance, terms, options);
-  for (const FitStart& start : starts) {
+  const auto moved_to = [&](const FitStart& start) {
     std::vector<EffectTerm> moved = terms;
     for (std::size_t i = 0; i < moved.size(); ++i) moved[i].values = start.values[i];
-    Fit tried = fit(model, start.nuisance, moved, options);
+    return moved;
+  };
+  const bool suffice = std::ranges::any_of(starts, [&](const FitStart& start) {
+    return start.alone &&
+           model.evaluate(start.nuisance, moved_to(start)).total() > model.evaluate(nuisance, terms).total();
+  });
+  std::optional<Fit> found;
+  if (!suffice) found = fit(model, nuisance, terms, options);
+  for (const FitStart& start : starts) {
+    Fit tried = fit(model, start.nuisance, moved_to(start), options);
     if (!found || tried.penalised > found->penalised || !std::isfinite(found->penalised)) found = std::move(tried);
   }
   Fit best = std::move(*found);

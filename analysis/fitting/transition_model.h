@@ -142,7 +142,7 @@ struct EffectGroup {
 struct FitStart {
   std::vector<double> nuisance;
   std::vector<std::vector<double>> values;  ///< by term
-  bool alone = false;                       ///< the usual start is not worth a fit beside it
+  bool alone = false;                       ///< where it is likelier, the usual start is not worth a fit
 };
 
 class TransitionModel;

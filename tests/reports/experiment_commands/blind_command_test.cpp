@@ -84,7 +84,7 @@ TEST_F(BlindRun, MakesAndOpensCasesOfWalkers) {
   run_blind_make(request_);
   const fs::path one = fs::path(request_.folder) / "cases" / "0001";
   EXPECT_FALSE(fs::exists(one / "collisions.csv"));
-  EXPECT_GE(analysis::read_walks(one)->runs.trials.size(), 60u);
+  EXPECT_GE(analysis::read_walks(one)->runs.trials.size(), 25u);
   BlindRequest wheels = request_;
   wheels.size.walkers = false;
   EXPECT_NE(message_of([&] { run_blind_make(wheels); }).find("belongs to a run of another seed or size"),
