@@ -626,7 +626,7 @@ MeshStudy mesh_study(const BatchMap& map, std::span<const double> start, const M
     if (options.simulated_steps == 0) throw;  // without a gait, a mesh alone does not vouch for its nodes
     if (auto walk = noise_free_walk(map, start)) try {
         return study_around(map, start, options, around_walk(std::move(*walk)));
-      } catch (const NoFailureFound&) {  // nor is it a question about first passage
+      } catch (const MapError&) {  // nor is it a question about first passage: what follows is said of it
       }
     std::string walked;
     try {

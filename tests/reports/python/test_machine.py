@@ -151,7 +151,7 @@ class Refused(unittest.TestCase):
         still = metastable.runs(machine, trial=data["trial"], swing_rad=np.ones(120))
         self.check("a column that is constant says nothing", lambda: metastable.diagnose(still, machine))
         few = metastable.runs(machine, trial=[1, 1], swing_rad=[0.8, 0.7])
-        self.check("1 transitions are fewer than the 2 parameters", lambda: metastable.diagnose(few, machine))
+        self.check("1 transition is fewer than the 2 parameters", lambda: metastable.diagnose(few, machine))
         apart = metastable.runs(machine, trial=[1, 2], swing_rad=[0.8, 0.7])
         self.check("there is no transition", lambda: metastable.diagnose(apart, machine))
         self.check("outcome: \"fell\" is none of failed, stopped, lost", lambda: metastable.diagnose(
