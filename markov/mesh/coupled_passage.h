@@ -27,8 +27,8 @@ GaitClasses gait_classes(const Mesh& mesh, const std::vector<GaitOrbit>& gaits, 
 /// another, or from one turn of a gait of several revolutions to the next. The expected visits y = b + y Q are found by
 /// aggregation and disaggregation: in turns, the classes (by phase) are solved as one small chain, whose entries are
 /// sums of positive terms and which is eliminated without a subtraction (ChainSolver), and y is smoothed by products.
-/// What is left falls in a round as the classes mix within themselves, however seldom they are left (Koury, McAllister,
-/// Stewart 1984; Takahashi 1975).
+/// The error shrinks in each round by as much as the classes mix within themselves, however seldom a walker leaves them
+/// (Koury, McAllister, Stewart 1984; Takahashi 1975).
 ///
 /// Failure rate: of those that have walked on for ever. Survival and mixing: those of mesh_passage until survivors keep
 /// the form they have in the first gait, or over 4000 steps where they do not. `first_rate` is the chance of failing in

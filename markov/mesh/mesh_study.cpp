@@ -111,7 +111,7 @@ SimulationOptions walking(const MeshStudyOptions& options) {
   return {.seed = options.seed, .threads = options.threads, .most_steps = options.simulated_steps};
 }
 
-/// What a study lies around.
+/// Holds the orbit or walk without noise that the meshes of a study lie around, and their frames.
 struct Around {
   NoiseFreeOrbit orbit;
   int period = 1;                         ///< MeshStudy::period

@@ -215,7 +215,7 @@ TEST_F(ImportMat, Hdf5OfOtherPrograms) {
   }
 }
 
-// What libmatio itself would read as other numbers.
+// A file that is cut short or damaged is refused, where libmatio itself would read other numbers from it.
 TEST_F(ImportMat, CutShortOrDamagedIsRefused) {
   const auto refusal_of = [&](const std::string& text) {
     const std::string mat = file("broken.mat", text);
