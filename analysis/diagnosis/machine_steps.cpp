@@ -136,7 +136,8 @@ std::vector<double> drawn_steps(const TransitionModel& model, const TransitionMo
     std::size_t k = 0;
     for (double sum = fits[0].weight; sum < place && k + 1 < fits.size(); sum += fits[k].weight) ++k;
     const Fit fit = drawn_fit(model, *fits[k].fit, seed, i);
-    steps[i] = at.expected_steps(fit.nuisance, fit.terms, seed + 1 + i);
+    const std::unique_ptr<TransitionModel> again = at.relaunched(seed + 1 + i);
+    steps[i] = (again ? *again : at).expected_steps(fit.nuisance, fit.terms, seed + 1 + i);
   };
   markov::parallel_for(steps.size(), threads, drawn, [&](double) { heartbeat(); });
   return steps;

@@ -64,6 +64,8 @@ std::pair<std::string, std::unique_ptr<TransitionModel>> TransitionModel::elsewh
                     : place.front().first + ": the expected steps of this system are known only where it was measured");
 }
 
+std::unique_ptr<TransitionModel> TransitionModel::relaunched(std::uint64_t) const { return nullptr; }
+
 std::string TransitionModel::size_in_words(std::span<const EffectTerm>) const { return {}; }
 
 std::vector<double> TransitionModel::rest_chances(std::span<const double>, std::span<const EffectTerm>) const {

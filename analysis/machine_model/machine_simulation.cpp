@@ -3,11 +3,15 @@
 #include <Eigen/Core>
 #include <algorithm>
 #include <cmath>
+#include <map>
+#include <tuple>
 #include <utility>
+#include <vector>
 
 #include "analysis/machine_model/machine_design.h"
 #include "analysis/machine_model/machine_stepper.h"
 #include "analysis/statistics/random.h"
+#include "analysis/statistics/smooth_sample.h"
 #include "dynamics/numerics/truncated_normal.h"
 
 namespace metastable::analysis {
@@ -38,7 +42,9 @@ enum Purpose : std::size_t {
   offsets = 96,
   earlier = 128,
   wild_error = 160,
-  launch = 192
+  launch = 192,
+  donor = 224,
+  kernel = 225
 };
 
 // A trial under way.
@@ -188,7 +194,79 @@ MachineRuns Walker::walk() {
   return out;
 }
 
+// Trials of one design: their first rows hold the same columns.
+struct AlikeLaunches {
+  std::vector<std::size_t> trials;
+  std::vector<int> group;  // by trial: of those with the same condition, phase and labels
+};
+
+std::vector<AlikeLaunches> alike_launches(const MachineRuns& runs) {
+  std::map<std::vector<bool>, AlikeLaunches> by_columns;
+  std::map<std::vector<bool>, std::map<std::tuple<std::size_t, int, std::vector<int>>, int>> groups;
+  for (std::size_t t = 0; t < runs.trials.size(); ++t) {
+    const MachineTrial& trial = runs.trials[t];
+    if (trial.rows.empty()) continue;
+    const MachineRow& row = trial.rows.front();
+    std::vector<bool> columns;
+    for (const double seen : row.seen) columns.push_back(!std::isnan(seen));
+    auto& known = groups[columns];
+    const auto number = static_cast<int>(known.size());
+    by_columns[columns].trials.push_back(t);
+    by_columns[columns].group.push_back(
+        known.try_emplace({trial.condition, row.phase, row.labels}, number).first->second);
+  }
+  std::vector<AlikeLaunches> all;
+  for (auto& [columns, alike] : by_columns) all.push_back(std::move(alike));
+  return all;
+}
+
 }  // namespace
+
+MachineRuns smoothed_launches(const Machine& machine, const MachineRuns& runs, const MachineHypothesis& supposed,
+                              std::uint64_t seed) {
+  MachineRuns out = runs;
+  for (const AlikeLaunches& alike : alike_launches(runs)) {
+    std::vector<std::size_t> seen;  // sensors
+    for (std::size_t j = 0; j < machine.observe.size(); ++j)
+      if (!std::isnan(runs.trials[alike.trials.front()].rows.front().seen[j])) seen.push_back(j);
+    if (seen.empty()) continue;
+    const auto size = static_cast<Eigen::Index>(seen.size());
+    Eigen::MatrixXd points(static_cast<Eigen::Index>(alike.trials.size()), size);
+    Eigen::VectorXd errors(size), normals(size);
+    for (Eigen::Index c = 0; c < size; ++c) {
+      const std::size_t j = seen[static_cast<std::size_t>(c)];
+      for (std::size_t i = 0; i < alike.trials.size(); ++i)
+        points(static_cast<Eigen::Index>(i), c) = runs.trials[alike.trials[i]].rows.front().seen[j];
+      const double added = supposed.added_noise.empty() ? 0 : supposed.added_noise[j];
+      // The values hold one error, and a simulation takes off another.
+      errors[c] = 2 * (supposed.sensor_sd[j] * supposed.sensor_sd[j] + added * added);
+    }
+    const SmoothSample sample(points, alike.group, errors);
+    for (std::size_t i = 0; i < alike.trials.size(); ++i) {
+      const Draws draws(seed, alike.trials[i]);
+      for (Eigen::Index c = 0; c < size; ++c) normals[c] = draws.normal(0, kernel + static_cast<std::size_t>(c));
+      const Eigen::VectorXd drawn = sample.draw(i, draws.uniform(0, donor), normals);
+      for (Eigen::Index c = 0; c < size; ++c)
+        out.trials[alike.trials[i]].rows.front().seen[seen[static_cast<std::size_t>(c)]] = drawn[c];
+    }
+  }
+  return out;
+}
+
+MachineRuns resampled_launches(const MachineRuns& runs, std::uint64_t seed) {
+  MachineRuns out = runs;
+  for (const AlikeLaunches& alike : alike_launches(runs)) {
+    std::map<int, std::vector<std::size_t>> members;
+    for (std::size_t i = 0; i < alike.trials.size(); ++i) members[alike.group[i]].push_back(alike.trials[i]);
+    for (std::size_t i = 0; i < alike.trials.size(); ++i) {
+      const std::vector<std::size_t>& of = members[alike.group[i]];
+      const double place = Draws(seed, alike.trials[i]).uniform(0, donor) * static_cast<double>(of.size());
+      const std::size_t like = of[std::min(of.size() - 1, static_cast<std::size_t>(place))];
+      out.trials[alike.trials[i]].rows.front().seen = runs.trials[like].rows.front().seen;
+    }
+  }
+  return out;
+}
 
 MachineRuns simulate_machine(const Machine& machine, const MachineRuns& runs, const MachineHypothesis& supposed,
                              std::uint64_t seed) {

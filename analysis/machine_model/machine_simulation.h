@@ -15,4 +15,14 @@ namespace metastable::analysis {
 MachineRuns simulate_machine(const Machine& machine, const MachineRuns& runs, const MachineHypothesis& supposed,
                              std::uint64_t seed);
 
+/// Draws first rows anew, as likely as the measured ones of trials with the same condition, phase, labels and columns:
+/// from their smoothed distribution (SmoothSample), of which the errors of the sensors are no part once
+/// simulate_machine() has taken them off. Nothing but the first rows differs.
+MachineRuns smoothed_launches(const Machine& machine, const MachineRuns& runs, const MachineHypothesis& supposed,
+                              std::uint64_t seed);
+
+/// Gives each trial the first row of a trial drawn from those with the same condition, phase, labels and columns: the
+/// launches that as many trials might have had (a bootstrap).
+MachineRuns resampled_launches(const MachineRuns& runs, std::uint64_t seed);
+
 }  // namespace metastable::analysis

@@ -86,13 +86,13 @@ class MachineTransitions : public TransitionModel {
   }
   std::unique_ptr<TransitionModel> simulate(std::span<const double> nuisance, std::span<const EffectTerm> terms,
                                             std::uint64_t seed) const override {
-    return drawn(nuisance, terms, seed);
+    return drawn(runs_, nuisance, terms, seed);
   }
   std::vector<ChangedExperiment> alternatives(std::span<const double> nuisance, std::span<const EffectTerm> terms,
                                               std::uint64_t seed) const override {
     const std::vector<double> n(nuisance.begin(), nuisance.end());
     const std::vector<EffectTerm> t(terms.begin(), terms.end());
-    return {{"", 0, "the same experiment once more", [this, n, t, seed] { return drawn(n, t, seed); }}};
+    return {{"", 0, "the same experiment once more", [this, n, t, seed] { return drawn(runs_, n, t, seed); }}};
   }
   std::pair<double, double> rests() const override {
     double at_risk = 0, failed = 0;
@@ -103,14 +103,19 @@ class MachineTransitions : public TransitionModel {
     }
     return {at_risk, failed};
   }
+  std::unique_ptr<TransitionModel> relaunched(std::uint64_t seed) const override {
+    auto copy = std::make_unique<MachineTransitions>(*this);
+    copy->runs_ = resampled_launches(runs_, seed);
+    return copy;
+  }
   double expected_steps(std::span<const double> nuisance, std::span<const EffectTerm> terms,
                         std::uint64_t seed) const override;
   const std::vector<std::string>& notes() const override { return notes_; }
   std::vector<NamedValue> report_nuisances(std::span<const double> nuisance) const override;
 
  private:
-  std::unique_ptr<MachineTransitions> drawn(std::span<const double> nuisance, std::span<const EffectTerm> terms,
-                                            std::uint64_t seed) const;
+  std::unique_ptr<MachineTransitions> drawn(const MachineRuns& like, std::span<const double> nuisance,
+                                            std::span<const EffectTerm> terms, std::uint64_t seed) const;
   MachineHypothesis hypothesis(std::span<const double> nuisance, std::span<const EffectTerm> terms) const;
   void set_up_nuisances();
   void set_up_effects();
@@ -203,11 +208,11 @@ void MachineTransitions::require_noise() const {
   }
 }
 
-std::unique_ptr<MachineTransitions> MachineTransitions::drawn(std::span<const double> nuisance,
+std::unique_ptr<MachineTransitions> MachineTransitions::drawn(const MachineRuns& like, std::span<const double> nuisance,
                                                               std::span<const EffectTerm> terms,
                                                               std::uint64_t seed) const {
   auto copy = std::make_unique<MachineTransitions>(*this);
-  copy->runs_ = simulate_machine(*machine_, runs_, hypothesis(nuisance, terms), seed);
+  copy->runs_ = simulate_machine(*machine_, like, hypothesis(nuisance, terms), seed);
   copy->design_ = std::make_shared<MachineDesign>(machine_design(*machine_, copy->runs_));
   copy->effects_.clear();
   copy->candidates_.clear();
@@ -219,14 +224,17 @@ std::unique_ptr<MachineTransitions> MachineTransitions::drawn(std::span<const do
   return copy;
 }
 
-// Failures are counted in the experiment drawn again and again. Where too few come, the chances of failure in one such
-// experiment may say more; they miss failures from states that it did not meet, and never make a failure rarer.
+// Failures are counted in the experiment drawn again and again, with launches like those measured. Where too few come,
+// the chances of failure in one such experiment may say more; they miss failures from states that it did not meet, and
+// never make a failure rarer.
 double MachineTransitions::expected_steps(std::span<const double> nuisance, std::span<const EffectTerm> terms,
                                           std::uint64_t seed) const {
   const MachineHypothesis supposed = hypothesis(nuisance, terms);
   double steps = 0, failed = 0;
   for (std::uint64_t again = 0; steps < enough_steps && failed < enough_failures; ++again) {
-    const MachineRuns drawn = simulate_machine(*machine_, runs_, supposed, seed + again * seeds_apart);
+    const std::uint64_t now = seed + again * seeds_apart;
+    const MachineRuns launched = smoothed_launches(*machine_, runs_, supposed, now);
+    const MachineRuns drawn = simulate_machine(*machine_, launched, supposed, now);
     for (const MachineTrial& trial : drawn.trials) {
       steps += static_cast<double>(steps_of(trial));
       failed += trial.outcome == MachineOutcome::failed;
@@ -234,7 +242,7 @@ double MachineTransitions::expected_steps(std::span<const double> nuisance, std:
   }
   double rate = failed / steps;
   if (failed < few_failures && plan_.failing) {
-    const auto trials = drawn(nuisance, terms, seed);
+    const auto trials = drawn(smoothed_launches(*machine_, runs_, supposed, seed), nuisance, terms, seed);
     const std::vector<double> chances = trials->rest_chances(nuisance, terms);
     double at_risk = 0, expected = 0;
     for (std::size_t e = 0; e < chances.size(); ++e)

@@ -9,7 +9,7 @@
 
 #include "analysis/sensitivity/setting_labels.h"
 #include "analysis/statistics/number_text.h"
-#include "analysis/statistics/t_interval.h"
+#include "analysis/statistics/interval_95.h"
 #include "analysis/study/landing_error.h"
 
 namespace metastable::analysis {

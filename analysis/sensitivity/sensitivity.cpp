@@ -7,7 +7,7 @@
 #include <stdexcept>
 
 #include "analysis/sensitivity/pathwise.h"
-#include "analysis/statistics/t_interval.h"
+#include "analysis/statistics/interval_95.h"
 #include "analysis/study/exact_rows.h"
 #include "analysis/study/pilot.h"
 #include "markov/parallel.h"

@@ -9,7 +9,7 @@
 #include <stdexcept>
 
 #include "analysis/statistics/random.h"
-#include "analysis/statistics/t_interval.h"
+#include "analysis/statistics/interval_95.h"
 #include "markov/parallel.h"
 
 namespace metastable::analysis {

@@ -10,7 +10,7 @@
 #include <queue>
 #include <utility>
 
-#include "analysis/statistics/t_interval.h"
+#include "analysis/statistics/interval_95.h"
 #include "analysis/study/chain_summary.h"
 #include "markov/parallel.h"
 #include "markov/transition_rows/draws.h"

@@ -9,7 +9,7 @@
 #include <utility>
 #include <vector>
 
-#include "analysis/statistics/t_interval.h"
+#include "analysis/statistics/interval_95.h"
 #include "analysis/study/trial_study.h"
 #include "markov/parallel.h"
 

@@ -7,7 +7,7 @@
 #include <numeric>
 #include <utility>
 
-#include "analysis/statistics/t_interval.h"
+#include "analysis/statistics/interval_95.h"
 #include "analysis/study/consistency.h"
 #include "analysis/study/followed_study.h"
 #include "markov/parallel.h"

@@ -2,7 +2,7 @@
 
 #include <cmath>
 
-#include "analysis/statistics/t_interval.h"
+#include "analysis/statistics/interval_95.h"
 
 namespace metastable::reports {
 

@@ -9,6 +9,7 @@
 #include <string>
 
 #include "analysis/diagnosis/diagnosis.h"
+#include "analysis/statistics/random.h"
 #include "dynamics/numerics/truncated_normal.h"
 #include "tests/analysis/machine_model/machines.h"
 
@@ -83,6 +84,47 @@ TEST(MachineTransitions, ExpectedStepsAreThoseOfItsChanceOfFailure) {
     const double steps = 1 / dynamics::normal_cdf(edge);
     EXPECT_NEAR(std::log(model->expected_steps(nuisance, {}, 1) / steps), 0, edge < -3 ? 0.5 : 0.25) << edge;
   }
+}
+
+// The machine fails in its first step if it starts below -1.5, which one launch in 15 does: 30 launches tell how they
+// vary, not that one of them did. The rate of many such experiments is met, and launches drawn again say how little 30
+// know of it.
+TEST(MachineTransitions, ExpectedStepsKnowLaunchesFromAFewTrials) {
+  Machine machine = linear_machine(0.01);
+  machine.effects.clear();
+  machine.may_vary.clear();
+  machine.parameters = {{"edge", -1.5, 0.1}};
+  machine.step = [](const MachineBatch& batch) {
+    for (std::size_t i = 0; i < batch.rows; ++i) {
+      batch.next[i] = 10 + batch.scores[i];
+      batch.failed[i] = batch.states[i] < batch.value(0, i);
+    }
+  };
+  std::vector<double> logs, within;
+  for (std::uint64_t experiment = 0; experiment < 16; ++experiment) {
+    MachineRuns runs =
+        scalar_runs(30, 2, 0, 0.01, 40 + experiment, [](double, double z, std::size_t) { return 10 + z; });
+    const std::vector<double> launches = normal_multipliers(9, experiment, DrawStream::machine, 30);
+    for (std::size_t t = 0; t < 30; ++t) runs.trials[t].rows[0].seen[0] = launches[t];
+    runs.trials[0].outcome = MachineOutcome::failed;
+    runs.trials[0].rows.resize(1);
+    const auto model = machine_transitions(std::make_shared<const Machine>(machine), runs);
+    const std::vector<double> nuisance = nominal_values(*model);
+    logs.push_back(std::log(model->expected_steps(nuisance, {}, 1)));
+    double sum = 0, square = 0;
+    for (std::uint64_t seed = 1; seed <= 4; ++seed) {
+      const double again = std::log(model->relaunched(seed)->expected_steps(nuisance, {}, seed));
+      sum += again / 4, square += again * again / 4;
+    }
+    within.push_back(square - sum * sum);
+  }
+  double mean = 0, variance = 0;
+  for (const double log : logs) mean += log / 16;
+  for (const double one : within) variance += one / 16 * 4 / 3;
+  EXPECT_NEAR(mean, std::log(1 / dynamics::normal_cdf(-1.5)), 0.25);
+  // The mean and the sd of 30 normal launches leave 0.52^2 open, their count below the edge 0.7^2.
+  EXPECT_GT(variance, 0.15);
+  EXPECT_LT(variance, 1.2);
 }
 
 }  // namespace
