@@ -15,6 +15,7 @@
 #include "analysis/diagnosis/beside_unnamed.h"
 #include "analysis/diagnosis/detectability.h"
 #include "analysis/diagnosis/diagnosis_sentences.h"
+#include "analysis/diagnosis/even_push.h"
 #include "analysis/diagnosis/gap_tests.h"
 #include "analysis/diagnosis/machine_steps.h"
 #include "analysis/diagnosis/missing_columns.h"
@@ -430,6 +431,8 @@ Diagnosis answer(const TransitionModel& model, const Fitted& fitted, const std::
     if (d.verdict == Verdict::partly_explained) doubt_effects(d, candidates);
   }
 
+  if (best && (d.verdict == Verdict::explained || d.verdict == Verdict::partly_explained))
+    d.causes.even_push = even_push_in_words(model, fitted.recalibrated, *best, d.rules, options.threads);
   progress(0.88, "steps before failure");
   d.shrinkage.steps = steps_before_failure(model, fitted.given.nuisance, fitted.recalibrated, cause, options.seed);
   if (const auto [at_risk, rests] = model.rests(); at_risk > 0 && !d.shrinkage.measures.empty())

@@ -338,6 +338,7 @@ std::string next_step(const Diagnosis& d) {
 std::vector<std::string> sentences(const Diagnosis& d) {
   std::vector<std::string> all;
   say_verdict(all, d);
+  if (!d.causes.even_push.empty()) all.push_back(d.causes.even_push);
   if (!d.data.accepted_defects.empty())
     all.push_back(fmt::format("It stands on defects that were accepted: {}.", d.data.accepted_defects));
   say_where(all, d);

@@ -191,6 +191,9 @@ class TransitionModel {
   virtual std::string recalibration_id() const { return "recalibration"; }
   /// Lists what may vary without a name: it is fitted as candidates are, held against them, and never a cause.
   virtual const std::vector<Variation>& variations() const;
+  /// Returns the push of every observed value by a number of its own, the same at every step, whatever causes it; its
+  /// parameters are in the order of columns(). The default, nullptr, says that this system has none.
+  virtual const Candidate* even_push() const { return nullptr; }
   /// Gives the densities with these nuisances and effects. Values outside a model's reach give a very small density,
   /// never a NaN.
   virtual Evaluation evaluate(std::span<const double> nuisance, std::span<const EffectTerm> terms) const = 0;

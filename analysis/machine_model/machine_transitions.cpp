@@ -66,6 +66,7 @@ class MachineTransitions : public TransitionModel {
   const std::vector<Nuisance>& nuisances() const override { return nuisances_; }
   const std::vector<Candidate>& candidates() const override { return candidates_; }
   const std::vector<Variation>& variations() const override { return variations_; }
+  const Candidate* even_push() const override { return &push_.variation.candidate; }
   bool refits_noise() const override {
     return std::ranges::any_of(machine_->observe, [](const MachineSensor& s) { return !s.sd; });
   }
@@ -132,6 +133,7 @@ class MachineTransitions : public TransitionModel {
   std::vector<Candidate> candidates_;
   std::vector<MachineVariation> varied_;
   std::vector<Variation> variations_;
+  MachineVariation push_;
   std::vector<std::string> notes_;
   std::shared_ptr<const TolerantStarts> starts_;  // those of a copy are its own
 };
@@ -159,6 +161,7 @@ void MachineTransitions::set_up_nuisances() {
 void MachineTransitions::set_up_effects() {
   effects_ = machine_effects(*machine_, design_);
   varied_ = machine_variations(*machine_, design_);
+  push_ = analysis::even_push(*machine_, design_);
   for (const MachineCandidate& one : effects_) candidates_.push_back(one.candidate);
   for (const MachineVariation& one : varied_) variations_.push_back(one.variation);
   std::set<std::string> ids;
@@ -185,6 +188,7 @@ MachineHypothesis MachineTransitions::hypothesis(std::span<const double> nuisanc
     else
       for (const MachineVariation& one : varied_)
         if (named(one.variation.candidate)) one.apply(h, term.variant, term.values);
+    if (named(push_.variation.candidate)) push_.apply(h, term.variant, term.values);
   }
   return h;
 }

@@ -106,4 +106,19 @@ std::vector<MachineVariation> machine_variations(const Machine& machine, std::sh
   return all;
 }
 
+MachineVariation even_push(const Machine& machine, std::shared_ptr<const MachineDesign> design) {
+  MachineVariation one;
+  one.variation.candidate.id = "even push";
+  std::vector<std::size_t> states;
+  for (std::size_t j = 0; j < machine.observe.size(); ++j) {
+    const double most = largest_push * (design->change[j] > 0 ? design->change[j] : 1);
+    one.variation.candidate.parameters.push_back({0, -most, most, step * most});
+    states.push_back(machine.state_index(machine.observe[j].state));
+  }
+  one.apply = [states, steps = design->steps.size()](MachineHypothesis& h, const Values&, const Values& v) {
+    for (std::size_t j = 0; j < states.size(); ++j) h.pushes.push_back({states[j], Values(steps, v[j])});
+  };
+  return one;
+}
+
 }  // namespace metastable::analysis
