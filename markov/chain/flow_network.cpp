@@ -7,38 +7,41 @@
 namespace metastable::markov {
 namespace {
 
-using Row = std::vector<Extended>;
-
 constexpr std::size_t eliminated_groups = 200;  // of the coarsest level
 constexpr std::size_t most_levels = 40;
-constexpr Extended strong = 0.05L;        // of the largest flow of either state: joins them
-constexpr double joined_enough = 0.5;     // groups a state, above which states are joined by strongest flows
-constexpr Extended hardly_lost = 1e-15L;  // losses a flow, below which the coarsest level does without them
+constexpr double strong = 0.05;        // of the largest flow of either state: joins them
+constexpr double joined_enough = 0.5;  // groups a state, above which states are joined by strongest flows
+constexpr double hardly_lost = 1e-15;  // losses a flow, below which the coarsest level does without them
 
-Extended sum_of(std::span<const Extended> v) { return std::accumulate(v.begin(), v.end(), Extended{0}); }
+template <typename Real>
+Real sum_of(const std::vector<Real>& v) {
+  return std::accumulate(v.begin(), v.end(), Real{0});
+}
 
 /// Flows by the state they leave, or by the state they enter.
+template <typename Real>
 struct Arcs {
   std::vector<std::size_t> start{0};
   std::vector<std::uint32_t> end;
-  Row flow;
+  std::vector<Real> flow;
 
   std::size_t size() const { return start.size() - 1; }
-  Extended over(std::size_t i, std::span<const Extended> x) const {
-    Extended sum = 0;
+  Real over(std::size_t i, std::span<const Real> x) const {
+    Real sum = 0;
     for (std::size_t e = start[i]; e < start[i + 1]; ++e) sum += flow[e] * x[end[e]];
     return sum;
   }
-  Row sums() const {
-    Row sums(size(), 0);
+  std::vector<Real> sums() const {
+    std::vector<Real> sums(size(), 0);
     for (std::size_t i = 0; i < size(); ++i)
       for (std::size_t e = start[i]; e < start[i + 1]; ++e) sums[i] += flow[e];
     return sums;
   }
 };
 
-Arcs transposed(const Arcs& arcs) {
-  Arcs other;
+template <typename Real>
+Arcs<Real> transposed(const Arcs<Real>& arcs) {
+  Arcs<Real> other;
   other.start.assign(arcs.size() + 1, 0);
   other.end.resize(arcs.end.size());
   other.flow.resize(arcs.end.size());
@@ -82,9 +85,10 @@ class Groups {
   std::vector<std::uint32_t> parent_;
 };
 
-std::pair<std::vector<std::uint32_t>, std::size_t> grouped(const Arcs& out, bool by_threshold) {
+template <typename Real>
+std::pair<std::vector<std::uint32_t>, std::size_t> grouped(const Arcs<Real>& out, bool by_threshold) {
   const std::size_t n = out.size();
-  Row largest(n, 0);
+  std::vector<Real> largest(n, 0);
   std::vector<std::uint32_t> partner(n);
   for (std::uint32_t i = 0; i < n; ++i)
     for (std::size_t e = out.start[i]; e < out.start[i + 1]; ++e)
@@ -103,15 +107,16 @@ std::pair<std::vector<std::uint32_t>, std::size_t> grouped(const Arcs& out, bool
 }
 
 /// Adds up the flows between groups.
-Arcs between(const Arcs& out, const std::vector<std::uint32_t>& group, std::size_t count) {
+template <typename Real>
+Arcs<Real> between(const Arcs<Real>& out, const std::vector<std::uint32_t>& group, std::size_t count) {
   std::vector<std::size_t> first(count + 1, 0);
   for (const std::uint32_t g : group) ++first[g + 1];
   std::partial_sum(first.begin(), first.end(), first.begin());
   std::vector<std::uint32_t> members(group.size());
   std::vector<std::size_t> next(first.begin(), first.end() - 1);
   for (std::uint32_t i = 0; i < group.size(); ++i) members[next[group[i]]++] = i;
-  Arcs coarse;
-  Row flow(count, 0);
+  Arcs<Real> coarse;
+  std::vector<Real> flow(count, 0);
   std::vector<std::uint32_t> met;
   for (std::size_t g = 0; g < count; ++g) {
     met.clear();
@@ -125,7 +130,7 @@ Arcs between(const Arcs& out, const std::vector<std::uint32_t>& group, std::size
     std::sort(met.begin(), met.end());
     for (const std::uint32_t to : met) {
       coarse.end.push_back(to);
-      coarse.flow.push_back(std::exchange(flow[to], 0));
+      coarse.flow.push_back(std::exchange(flow[to], Real{0}));
     }
     coarse.start.push_back(coarse.end.size());
   }
@@ -134,36 +139,43 @@ Arcs between(const Arcs& out, const std::vector<std::uint32_t>& group, std::size
 
 }  // namespace
 
-struct FlowNetwork::Level {
-  Arcs out, in;
+template <typename Real>
+struct FlowNetwork<Real>::Level {
+  Arcs<Real> out, in;
   Row loss, total;
   std::vector<std::uint32_t> group;  ///< of each state, on the next level; empty on the last one
 
-  Level(Arcs flows, Row losses)
+  Level(Arcs<Real> flows, Row losses)
       : out(std::move(flows)), in(transposed(out)), loss(std::move(losses)), total(out.sums()) {
     for (std::size_t i = 0; i < total.size(); ++i) total[i] += loss[i];
   }
-  const Arcs& rows(Side side) const { return side == Side::from ? out : in; }
+  const Arcs<Real>& rows(FlowSide side) const { return side == FlowSide::from ? out : in; }
 };
 
-FlowNetwork::FlowNetwork(const Generator& generator, std::span<const Extended> visits, bool lossless,
-                         Grouping grouping) {
+template <typename Real>
+FlowNetwork<Real>::FlowNetwork(const Generator& generator, std::span<const Extended> visits, bool lossless,
+                               Grouping grouping) {
   const std::size_t n = generator.size();
-  Arcs out{generator.start, generator.column, generator.rate};
+  Arcs<Real> out{generator.start, generator.column, Row(generator.rate.size())};
   Row loss(n, 0);
   for (std::size_t i = 0; i < n; ++i) {
-    for (std::size_t e = out.start[i]; e < out.start[i + 1]; ++e) out.flow[e] *= visits[i];
-    if (!lossless) loss[i] = visits[i] * generator.kill[i];
+    for (std::size_t e = out.start[i]; e < out.start[i + 1]; ++e)
+      out.flow[e] = static_cast<Real>(visits[i] * generator.rate[e]);
+    if (!lossless) loss[i] = static_cast<Real>(visits[i] * generator.kill[i]);
   }
   levels_.emplace_back(std::move(out), std::move(loss));
   coarsen(grouping);
 }
 
-FlowNetwork::~FlowNetwork() = default;
-FlowNetwork::FlowNetwork(FlowNetwork&&) noexcept = default;
-FlowNetwork& FlowNetwork::operator=(FlowNetwork&&) noexcept = default;
+template <typename Real>
+FlowNetwork<Real>::~FlowNetwork() = default;
+template <typename Real>
+FlowNetwork<Real>::FlowNetwork(FlowNetwork&&) noexcept = default;
+template <typename Real>
+FlowNetwork<Real>& FlowNetwork<Real>::operator=(FlowNetwork&&) noexcept = default;
 
-void FlowNetwork::coarsen(Grouping grouping) {
+template <typename Real>
+void FlowNetwork<Real>::coarsen(Grouping grouping) {
   while (levels_.back().total.size() > eliminated_groups && levels_.size() < most_levels) {
     Level& fine = levels_.back();
     auto [group, count] = grouped(fine.out, grouping == Grouping::threshold);
@@ -177,7 +189,8 @@ void FlowNetwork::coarsen(Grouping grouping) {
     levels_.push_back(std::move(coarse));
   }
   const Level& last = levels_.back();
-  Generator generator{last.out.start, last.out.end, last.out.flow, last.loss};
+  Generator generator{
+      last.out.start, last.out.end, {last.out.flow.begin(), last.out.flow.end()}, {last.loss.begin(), last.loss.end()}};
   if (sum_of(last.loss) <= hardly_lost * sum_of(last.total)) {
     // Residuals sum to zero then, and the solution is the one that is 0 in the first group.
     std::fill(generator.kill.begin(), generator.kill.end(), Extended{0});
@@ -186,12 +199,18 @@ void FlowNetwork::coarsen(Grouping grouping) {
   coarsest_ = std::make_unique<GeneratorFactors>(generator);
 }
 
-std::span<const Extended> FlowNetwork::loss() const { return levels_[0].loss; }
-std::span<const Extended> FlowNetwork::total() const { return levels_[0].total; }
-Row FlowNetwork::arriving() const { return levels_[0].in.sums(); }
+template <typename Real>
+std::span<const Real> FlowNetwork<Real>::loss() const {
+  return levels_[0].loss;
+}
+template <typename Real>
+std::span<const Real> FlowNetwork<Real>::total() const {
+  return levels_[0].total;
+}
 
-Row FlowNetwork::apply(std::span<const Extended> x, Side side) const {
-  const Arcs& rows = levels_[0].rows(side);
+template <typename Real>
+std::vector<Real> FlowNetwork<Real>::apply(std::span<const Real> x, FlowSide side) const {
+  const Arcs<Real>& rows = levels_[0].rows(side);
   Row y(x.size());
   for (std::size_t i = 0; i < x.size(); ++i) {
     y[i] = levels_[0].loss[i] * x[i];
@@ -200,20 +219,28 @@ Row FlowNetwork::apply(std::span<const Extended> x, Side side) const {
   return y;
 }
 
-Row FlowNetwork::apply_unbalanced(std::span<const Extended> x) const {
+template <typename Real>
+std::vector<Real> FlowNetwork<Real>::apply_unbalanced(std::span<const Real> x) const {
   Row y(x.size());
   for (std::size_t i = 0; i < x.size(); ++i) y[i] = levels_[0].total[i] * x[i] - levels_[0].in.over(i, x);
   return y;
 }
 
-Row FlowNetwork::corrected(std::span<const Extended> residual, Side side) const { return cycle(0, residual, side); }
+template <typename Real>
+std::vector<Real> FlowNetwork<Real>::corrected(std::span<const Real> residual, FlowSide side) const {
+  return cycle(0, residual, side);
+}
 
 /// Sweeps forwards (Gauss, Seidel), corrects what is left on the next level, and sweeps backwards.
-Row FlowNetwork::cycle(std::size_t at, std::span<const Extended> residual, Side side) const {
-  if (at + 1 == levels_.size() && coarsest_)
-    return side == Side::from ? coarsest_->solve(residual) : coarsest_->solve_left(residual);
+template <typename Real>
+std::vector<Real> FlowNetwork<Real>::cycle(std::size_t at, std::span<const Real> residual, FlowSide side) const {
+  if (at + 1 == levels_.size() && coarsest_) {
+    const std::vector<Extended> right(residual.begin(), residual.end());
+    const std::vector<Extended> x = side == FlowSide::from ? coarsest_->solve(right) : coarsest_->solve_left(right);
+    return Row(x.begin(), x.end());
+  }
   const Level& level = levels_[at];
-  const Arcs& rows = level.rows(side);
+  const Arcs<Real>& rows = level.rows(side);
   const std::size_t n = residual.size();
   Row x(n, 0);
   const auto sweep = [&](std::size_t i) { x[i] = (residual[i] + rows.over(i, x)) / level.total[i]; };
@@ -228,5 +255,8 @@ Row FlowNetwork::cycle(std::size_t at, std::span<const Extended> residual, Side 
   for (std::size_t i = n; i-- > 0;) sweep(i);
   return x;
 }
+
+template class FlowNetwork<double>;
+template class FlowNetwork<Extended>;
 
 }  // namespace metastable::markov

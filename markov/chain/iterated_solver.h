@@ -10,19 +10,23 @@
 
 namespace metastable::markov {
 
+class FlowCorrection;
+
 /// Iterates for the solutions of (I - Q) x = b and y (I - Q) = b on an irreducible generator.
 ///
 /// The rows are first weighted by the visits y of the chain without its kill rates, found to the rounding of extended
 /// precision, so that as much flows into a state as out of it. Then x = c + u: c follows from the balance of all
 /// losses, c sum l = sum g - sum l u, where nothing cancels however rare losses are, and u from A u = g - c l by
-/// conjugate residuals (Eisenstat, Elman, Schultz, SIAM J. Numer. Anal. 20, 1983) with FlowNetwork as preconditioner.
-/// One minus an eigenvalue occurs nowhere. Costs some tens of products with the rows; it vouches for nothing: callers
-/// hold what they get against the rows.
+/// conjugate residuals (Eisenstat, Elman, Schultz, SIAM J. Numer. Anal. 20, 1983) with FlowNetwork as preconditioner:
+/// these in double precision, and residuals anew in extended precision after each ten digits or so. One minus an
+/// eigenvalue occurs nowhere. Costs some tens of products with the rows; it vouches for nothing: callers hold what they
+/// get against the rows.
 class IteratedSolver {
  public:
   /// @param start  visits to begin with, > 0, or nothing
   /// @throws ConvergenceError("balance of visits", ...) where the visits do not settle
   IteratedSolver(Generator generator, std::span<const Extended> start, Heard heard);
+  ~IteratedSolver();
 
   /// x = base + rest, apart because their sum would round what neighbours differ by.
   struct Solution {
@@ -37,14 +41,13 @@ class IteratedSolver {
   const std::vector<Extended>& visits() const { return visits_; }
 
  private:
-  Solution solved(std::vector<Extended> right, FlowNetwork::Side side);
-  const FlowNetwork& network(FlowNetwork::Grouping grouping);
+  Solution solved(std::vector<Extended> right, FlowSide side);
 
   Generator generator_;
   Heard heard_;
   std::vector<Extended> visits_;
-  std::unique_ptr<FlowNetwork> network_;
-  FlowNetwork::Grouping grouping_ = FlowNetwork::Grouping::threshold;
+  int way_ = 0;  ///< of FlowCorrection, the easiest first
+  std::unique_ptr<FlowCorrection> correction_;
 };
 
 }  // namespace metastable::markov
