@@ -16,9 +16,10 @@ using Row = std::vector<Extended>;
 constexpr Extended extended_rounding = std::numeric_limits<Extended>::epsilon();
 constexpr double outwards = 4 * std::numeric_limits<double>::epsilon();  // a bound as a double
 constexpr double narrow = 1e-9;                                          // bounds that are not refined
-constexpr double enough = 1e-12;    // width of the bounds of a rate that need not be narrower
-constexpr int most_sweeps = 300;    // of a probability
-constexpr int most_refined = 4;     // corrections of a variance; each leaves a thousandth where a group is hardly left
+constexpr double enough = 1e-12;  // width of the bounds of a rate that need not be narrower
+constexpr int most_sweeps = 300;  // of a probability
+constexpr int most_refined =
+    4;  // corrections of a mean or a variance; each leaves a thousandth where a group is hardly left
 constexpr Extended swept = 1e-17L;  // residual, of what leaves the state
 
 /// v_i - sum q_ij v_j as a sum of products, and what its rounding may be.
@@ -160,6 +161,7 @@ Steps expected_steps(const Chain& chain, GeneratorSolver& solver) {
   Steps steps{solver.solve_split(Row(chain.size(), 1)), {}};
   steps.bounds = steps_enclosed(chain, steps.mean);
   if (!(steps.error() <= narrow)) steps.refine(chain, solver);
+  for (int again = 1; again < most_refined && !(steps.error() <= widest_bound); ++again) steps.refine(chain, solver);
   if (!(steps.error() <= widest_bound)) refuse("expected steps", steps.error());
   return steps;
 }
@@ -283,7 +285,8 @@ BoundedQuasiStationary bounded_quasi_stationary(const Chain& chain, const Heard&
   const auto can_rest = classify(chain).can_rest;
   if (bounded.rate_upper > (1 + enough) * bounded.rate_lower && std::count(can_rest.begin(), can_rest.end(), 0) == 0) {
     // One more iteration, whose vector is known to more digits of the differences between neighbours.
-    GeneratorSolver solver(generator_of(chain), heard);
+    const bool everywhere = std::all_of(pair.left.begin(), pair.left.end(), [](Extended share) { return share > 0; });
+    GeneratorSolver solver(generator_of(chain), heard, everywhere ? pair.left : Row());
     weight = solver.solve_split(pair.right);
     enclose_rate(chain, weight, bounded);
     if (bounded.rate_upper > (1 + narrow) * bounded.rate_lower)

@@ -7,6 +7,7 @@
 #include <limits>
 #include <numeric>
 #include <optional>
+#include <utility>
 
 #include "markov/chain/generator_solver.h"
 
@@ -20,6 +21,10 @@ constexpr Extended rounding = std::numeric_limits<Extended>::epsilon();
 constexpr int most_iterations = 400;
 /// An iteration that changes no entry by more, twice running, leaves errors of its square: the shift has come as near.
 constexpr Extended same_vector = 1e-10L;
+/// One such iteration is enough where what is left of the kill rates moves the vectors by no more.
+constexpr Extended hardly_moved = 1e-13L;
+/// Rate at which the state that returns are counted to is left for good, of its rate of leaving.
+constexpr Extended caught = 16;
 /// Of the rate, so much is taken for its rounding: sums of a few entries, some ten eliminations.
 constexpr Extended rate_rounding = 16 * rounding;
 /// A vector whose error may be larger than this is not given.
@@ -36,26 +41,22 @@ struct ClassPair {
   double error = 0;
 };
 
-/// Returns how long, at most, walkers of the killed-free generator take to its most visited state, forwards or
-/// backwards in time, and the state from which: about one over the distance of the next eigenvalue.
+/// Returns how long, at most, walkers of a generator without its kill rates take to its most visited state, forwards or
+/// backwards in time, and the state from which: about one over the distance of the next eigenvalue. Walkers are caught
+/// there at a rate, so that the stationary distribution serves the solver; what that takes is subtracted.
 std::pair<Extended, std::uint32_t> slowest_return(const Generator& closed, const Row& stationary,
                                                   std::uint32_t most_visited, const Heard& heard) {
-  States others;
-  Row weight;
-  for (std::uint32_t i = 0; i < closed.size(); ++i) {
-    if (i == most_visited) continue;
-    others.push_back(i);
-    weight.push_back(stationary[i]);
-  }
-  Generator without = closed;
-  std::fill(without.kill.begin(), without.kill.end(), Extended{0});
-  std::vector<std::uint32_t> scratch(closed.size(), Generator::outside);
-  GeneratorSolver solver(without.restricted_to(others, scratch), heard, weight);
-  const Row forwards = solver.solve(Row(others.size(), 1)), backwards = solver.solve_left(weight);
+  Generator caught_there = closed;
+  std::fill(caught_there.kill.begin(), caught_there.kill.end(), Extended{0});
+  caught_there.kill[most_visited] = caught * caught_there.exit(most_visited);
+  GeneratorSolver solver(caught_there, heard, stationary);
+  const Row forwards = solver.solve(Row(closed.size(), 1)), backwards = solver.solve_left(stationary);
+  const auto backwards_from = [&](std::uint32_t i) { return stationary[i] > 0 ? backwards[i] / stationary[i] : 0; };
+  const Extended caught_forwards = forwards[most_visited], caught_backwards = backwards_from(most_visited);
   std::pair<Extended, std::uint32_t> slowest{0, most_visited};
-  for (std::size_t k = 0; k < others.size(); ++k) {
-    const Extended time = std::max(forwards[k], weight[k] > 0 ? backwards[k] / weight[k] : 0);
-    if (time > slowest.first) slowest = {time, others[k]};
+  for (std::uint32_t i = 0; i < closed.size(); ++i) {
+    const Extended time = std::max(forwards[i] - caught_forwards, backwards_from(i) - caught_backwards);
+    if (time > slowest.first) slowest = {time, i};
   }
   return slowest;
 }
@@ -71,50 +72,76 @@ Extended move_up(Generator& scaled, const Row& steps, Extended longest) {
   return 1 / longest;
 }
 
-/// @param base  what has been taken off all kill rates
-ClassPair pair_of_class(Generator scaled, const States& states, Extended base, const Heard& heard) {
-  const std::size_t n = scaled.size();
-  ClassPair pair;
-  if (n == 1) {
-    pair.rate = scaled.kill[0];
-    pair.left = pair.right = {1};
-    return pair;
+/// Noda's iteration on one class, its least kill rate taken off.
+struct Noda {
+  Generator scaled;  ///< X^-1 (G - tau) X
+  Row right, visits;
+  Extended excess = 0;  ///< tau
+  Extended change = 1, before = 1;
+  int iterations = 0;
+
+  bool ended() const {
+    return std::all_of(scaled.kill.begin(), scaled.kill.end(), [](Extended kill) { return kill == 0; });
   }
-  const Extended common = *std::min_element(scaled.kill.begin(), scaled.kill.end());
-  Extended excess = 0;
-  for (Extended& kill : scaled.kill) kill -= common;
-  pair.right.assign(n, 1);
-  Extended change = 0;
-  Row visits;
-  for (Extended before = 1;; before = change) {
-    if (std::all_of(scaled.kill.begin(), scaled.kill.end(), [](Extended kill) { return kill == 0; })) break;
+  void iterate(const Heard& heard) {
     GeneratorSolver solver(scaled, heard, visits);
-    const Row steps = solver.solve(Row(n, 1));
+    const Row steps = solver.solve(Row(right.size(), 1));
     visits.assign(solver.visits().begin(), solver.visits().end());
     const auto [least, longest] = std::minmax_element(steps.begin(), steps.end());
     const Extended most = *longest;
-    change = (most - *least) / *least;
-    if (++pair.iterations > most_iterations || !std::isfinite(change))
+    before = std::exchange(change, (most - *least) / *least);
+    if (++iterations > most_iterations || !std::isfinite(change))
       throw ConvergenceError("Noda's iteration", static_cast<double>(change),
-                             fmt::format("still changing after {} iterations", pair.iterations));
-    for (std::size_t i = 0; i < n; ++i) pair.right[i] *= steps[i] / most;
+                             fmt::format("still changing after {} iterations", iterations));
+    for (std::size_t i = 0; i < right.size(); ++i) right[i] *= steps[i] / most;
     excess += move_up(scaled, steps, most);
-    if (change <= same_vector && before <= same_vector) break;
   }
-  const Row stationary = stationary_distribution(scaled, heard, visits);
-  excess += std::inner_product(stationary.begin(), stationary.end(), scaled.kill.begin(), Extended{0});
+};
+
+/// @param base  what has been taken off all kill rates
+ClassPair pair_of_class(Generator generator, const States& states, Extended base, const Heard& heard) {
+  const std::size_t n = generator.size();
+  ClassPair pair;
+  if (n == 1) {
+    pair.rate = generator.kill[0];
+    pair.left = pair.right = {1};
+    return pair;
+  }
+  const Extended common = *std::min_element(generator.kill.begin(), generator.kill.end());
+  for (Extended& kill : generator.kill) kill -= common;
+  Noda noda{std::move(generator), Row(n, 1), {}};
+  while (!noda.ended() && !(noda.change <= same_vector)) noda.iterate(heard);
+  Row stationary;
+  Extended excess = 0, error = 0;
+  for (;;) {
+    stationary = stationary_distribution(noda.scaled, heard, noda.visits);
+    const auto& kill = noda.scaled.kill;
+    excess = noda.excess + std::inner_product(stationary.begin(), stationary.end(), kill.begin(), Extended{0});
+    const auto most_visited =
+        static_cast<std::uint32_t>(std::max_element(stationary.begin(), stationary.end()) - stationary.begin());
+    const auto [time, from] = slowest_return(noda.scaled, stationary, most_visited, heard);
+    const Extended moved = *std::max_element(kill.begin(), kill.end()) * time;
+    const bool twice = noda.ended() || (noda.change <= same_vector && noda.before <= same_vector);
+    if (!twice && !(moved <= hardly_moved)) {
+      noda.iterate(heard);
+      continue;
+    }
+    error = std::max(!twice                       ? moved
+                     : noda.change <= same_vector ? noda.change * noda.change
+                                                  : 0,
+                     rate_rounding * excess * time);
+    if (!(error <= undecided))
+      throw NotUnique(states[most_visited], states[from], static_cast<double>(base + common + excess), false);
+    break;
+  }
   pair.rate = common + excess;
   pair.exact = excess == 0;
-  const auto most_visited =
-      static_cast<std::uint32_t>(std::max_element(stationary.begin(), stationary.end()) - stationary.begin());
-  const auto [time, from] = slowest_return(scaled, stationary, most_visited, heard);
-  const Extended error = std::max(change <= same_vector ? change * change : 0, rate_rounding * excess * time);
-  if (!(error <= undecided))
-    throw NotUnique(states[most_visited], states[from], static_cast<double>(base + pair.rate), false);
+  pair.iterations = noda.iterations;
   pair.error = static_cast<double>(error);
-  for (std::size_t i = 0; i < n; ++i) pair.left.push_back(stationary[i] / pair.right[i]);
+  for (std::size_t i = 0; i < n; ++i) pair.left.push_back(stationary[i] / noda.right[i]);
   const Extended sum = total(pair.left);
   for (Extended& entry : pair.left) entry /= sum;
+  pair.right = std::move(noda.right);
   return pair;
 }
 
