@@ -7,6 +7,7 @@
 #include <limits>
 #include <memory>
 #include <numeric>
+#include <string>
 
 #include "markov/chain/period.h"
 #include "markov/passage/survival_after.h"
@@ -14,10 +15,12 @@
 namespace metastable::markov {
 namespace {
 
-constexpr double followed_anyhow = 1e9;  // entries times steps
-constexpr double least_followed = 256;   // steps
-constexpr double most_followed = 20000;  // steps of survivors that do not settle, where no more are followed anyhow
-constexpr double settled_share = 1e-9;   // of every state, relative
+constexpr double followed_anyhow = 1e9;    // entries times steps
+constexpr double least_followed = 256;     // steps
+constexpr double most_followed = 20000;    // steps of survivors that do not settle, where no more are followed anyhow
+constexpr double settled_share = 1e-9;     // of every state, relative
+constexpr double rounded_share = 1e-6;     // of survivors, below which rounding may keep them from settling
+constexpr double settled_survival = 1e-8;  // what is not settled moves the survival by no more, relative
 
 /// Survivors of a chain, step by step.
 class Survivors {
@@ -51,14 +54,34 @@ class Survivors {
 };
 
 /// The settled distribution of survivors, cyclic class by cyclic class.
+///
+/// Without such classes survivors are p = a y + r, where a = p w / y w and r w = 0, and survive m more steps with
+/// probability a (1 - rate)^m + r Q^m (1 - c w) for any c. |1 - c w| is at most d w, d = 1 / min w - c with c halfway
+/// between 1 / max w and 1 / min w, so that what is not settled moves it by no more than d |r| w / a, relative, in all
+/// times to come: little where failures are rare, long before the shares have settled.
 class Settled {
  public:
   Settled(const Chain& chain, const QuasiStationary& quasi)
       : quasi_(quasi), period_(find_period(chain)), shares_(shares_in_classes(period_, quasi.distribution)) {
     of_class_ = in_classes(quasi.distribution);
+    const auto [least, most] = std::minmax_element(quasi.survival_weight.begin(), quasi.survival_weight.end());
+    if (period_.period == 1 && *least > 0) spread_ = (1 / *least - 1 / *most) / 2;
+    weighted_ =
+        std::inner_product(quasi.distribution.begin(), quasi.distribution.end(), quasi.survival_weight.begin(), 0.0);
   }
+  /// Returns the share of survivors, weighted by w, that is not settled: |r| w / a.
+  double unsettled(const std::vector<double>& survivors) const {
+    const double settled = settled_part(survivors);
+    double rest = 0;
+    for (std::size_t i = 0; i < survivors.size(); ++i)
+      rest += std::abs(survivors[i] - settled * quasi_.distribution[i]) * quasi_.survival_weight[i];
+    return rest / settled;
+  }
+  /// Returns the unsettled share that moves the survival by no more than settled_survival; 0 where none is known.
+  double harmless() const { return settled_survival / spread_; }
   /// Says whether survivors look so.
   bool reached(const std::vector<double>& survivors) const {
+    if (std::isfinite(spread_) && unsettled(survivors) <= harmless()) return true;
     const std::vector<double> mass = in_classes(survivors);
     double elsewhere = 0;
     for (std::size_t i = 0; i < survivors.size(); ++i) {
@@ -73,6 +96,7 @@ class Settled {
   }
   /// Returns the log of the probability that such survivors survive `more` steps.
   double log_survival(const std::vector<double>& survivors, double more) const {
+    if (std::isfinite(spread_)) return more * std::log1p(-quasi_.failure_rate) + std::log(settled_part(survivors));
     const std::vector<double> mass = in_classes(survivors);
     const auto turn = static_cast<std::size_t>(std::fmod(more, period_.period));
     double factor = 0;
@@ -82,6 +106,9 @@ class Settled {
   }
 
  private:
+  double settled_part(const std::vector<double>& survivors) const {
+    return std::inner_product(survivors.begin(), survivors.end(), quasi_.survival_weight.begin(), 0.0) / weighted_;
+  }
   std::size_t class_of(std::size_t i) const { return static_cast<std::size_t>(period_.state_class[i]); }
   std::vector<double> in_classes(const std::vector<double>& v) const {
     std::vector<double> mass(period_.classes.size(), 0.0);
@@ -91,7 +118,20 @@ class Settled {
   const QuasiStationary& quasi_;
   Period period_;
   std::vector<double> shares_, of_class_;
+  double spread_ = std::numeric_limits<double>::infinity(), weighted_ = 0;
 };
+
+/// Foresees after how many steps survivors have settled, from the unsettled share half-way and now. What is settled for
+/// all but rounding is settled now.
+double steps_foreseen(double now, double half_way, double share, double harmless) {
+  if (!(share > rounded_share) || !(harmless > 0)) return now;
+  const double fading = std::log(half_way / share) / (now / 2);
+  return fading > 0 ? now + std::log(share / harmless) / fading : std::numeric_limits<double>::infinity();
+}
+
+[[noreturn]] void refuse(const std::string& what) {
+  throw ConvergenceError("survival", std::numeric_limits<double>::quiet_NaN(), "survivors " + what);
+}
 
 /// Returns the probability of never coming to rest.
 double never(const Chain& chain, std::span<const double> start, const Heard& heard) {
@@ -126,12 +166,18 @@ std::vector<double> bounded_survival_after(const Chain& chain, std::span<const d
   if (last > anyhow) settled = std::make_unique<Settled>(chain, quasi());
   Survivors survivors(chain, start);
   std::vector<double> at{survivors.survival()};
+  double half_way = 0;
   while (static_cast<double>(at.size()) <= last && survivors.any() &&
          !(settled && settled->reached(survivors.shares()))) {
     if (heard) heard();
-    if (static_cast<double>(at.size()) > most)
-      throw ConvergenceError("survival", std::numeric_limits<double>::quiet_NaN(),
-                             fmt::format("survivors have not settled after {} steps", most));
+    const auto now = static_cast<double>(at.size());
+    if (now > most) refuse(fmt::format("have not settled after {} steps", most));
+    if (settled && now == std::floor(anyhow / 2)) half_way = settled->unsettled(survivors.shares());
+    if (settled && now == anyhow) {
+      const double share = settled->unsettled(survivors.shares());
+      const double foreseen = steps_foreseen(now, half_way, share, settled->harmless());
+      if (foreseen > most) refuse(fmt::format("settle after {:.2g} steps, and {} are followed", foreseen, most));
+    }
     survivors.step();
     at.push_back(survivors.survival());
   }

@@ -10,11 +10,12 @@
 namespace metastable::markov {
 
 /// Returns P(no rest within n steps) for each n of `steps`, as survival_after(). Survivors are followed by products.
-/// Once their shares are those of the quasi-stationary distribution, every one of them to 1e-9 (class by class of a
-/// cyclic chain), the survival goes on at the failure rate, and errs by no more than that and the rate's bounds say.
+/// Once what is left beside the quasi-stationary distribution moves the survival by no more than 1e-8, relative, in all
+/// times to come (of a cyclic chain, or one of which some states must fail: once every share is settled to 1e-9), the
+/// survival goes on at the failure rate, and errs by no more than that and the rate's bounds say.
 /// @param quasi  is asked for it where steps lie beyond those that are followed in any case (1e9 products of entries)
-/// @throws as survival_after(); ConvergenceError where survivors have not settled after 20000 steps,
-/// nor after those that are followed in any case
+/// @throws as survival_after(); ConvergenceError where survivors have not settled after 20000 steps, nor after those
+/// that are followed in any case, or where that is foreseen after the latter
 std::vector<double> bounded_survival_after(const Chain& chain, std::span<const double> start,
                                            std::span<const double> steps,
                                            const std::function<const QuasiStationary&()>& quasi,

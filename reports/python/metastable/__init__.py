@@ -877,7 +877,7 @@ def chain(matrix, kill, *, memory_gb=2, time_limit=900, threads=0):
     is eliminated without a subtraction: full relative accuracy however rare failures are. Others are solved by iteration.
     Of these, mean and sd of the steps, failure rate and committor are refused with a ComputationError where they cannot be
     proven to 1e-6, relative. Distribution, survival weight and survival are not proven: the first two are refused where
-    their residual is above 1e-8, and survival far ahead where the survivors' shares are not those of the distribution.
+    their residual is above 1e-8, and survival far ahead where survivors settle too slowly.
 
     Both hold real numbers; complex ones, masked arrays, text and missing numbers are refused.
     """
