@@ -171,9 +171,9 @@ def run_measured(command):
     return float(seconds), float(kilobytes) / 1024
 
 
-def google_benchmark(program):
+def google_benchmark(program, which="."):
     with tempfile.NamedTemporaryFile(suffix=".json") as out:
-        subprocess.run([program, f"--benchmark_out={out.name}", "--benchmark_out_format=json",
+        subprocess.run([program, f"--benchmark_out={out.name}", "--benchmark_out_format=json", f"--benchmark_filter={which}",
                         "--benchmark_repetitions=3", "--benchmark_min_time=0.2"], check=True)
         results = json.load(open(out.name))["benchmarks"]
     best = {}

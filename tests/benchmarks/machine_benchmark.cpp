@@ -22,7 +22,7 @@ void count_landings(benchmark::State& state) {
     benchmark::ClobberMemory();
   }
   state.counters["ns_each"] = benchmark::Counter(
-      static_cast<double>(count) * 1e-9, benchmark::Counter::kIsIterationInvariantRate | benchmark::Counter::invert);
+      static_cast<double>(count) * 1e-9, benchmark::Counter::kIsIterationInvariantRate | benchmark::Counter::kInvert);
 }
 
 METASTABLE_WIDE void take_roots(const double* x, double* root) {
@@ -38,7 +38,7 @@ void square_roots(benchmark::State& state) {
     benchmark::ClobberMemory();
   }
   state.counters["ns_each"] = benchmark::Counter(
-      static_cast<double>(count) * 1e-9, benchmark::Counter::kIsIterationInvariantRate | benchmark::Counter::invert);
+      static_cast<double>(count) * 1e-9, benchmark::Counter::kIsIterationInvariantRate | benchmark::Counter::kInvert);
 }
 
 // Times a landing found and counted, without the landing itself.
@@ -51,7 +51,7 @@ void tally(benchmark::State& state) {
     benchmark::ClobberMemory();
   }
   state.counters["ns_each"] = benchmark::Counter(
-      static_cast<double>(count) * 1e-9, benchmark::Counter::kIsIterationInvariantRate | benchmark::Counter::invert);
+      static_cast<double>(count) * 1e-9, benchmark::Counter::kIsIterationInvariantRate | benchmark::Counter::kInvert);
 }
 
 BENCHMARK(count_landings);
