@@ -23,7 +23,8 @@ constexpr int most_iterations = 400;
 constexpr Extended same_vector = 1e-10L;
 /// One such iteration is enough where what is left of the kill rates moves the vectors by no more.
 constexpr Extended hardly_moved = 1e-13L;
-/// Rate at which the state that returns are counted to is left for good, of its rate of leaving.
+/// Rate at which the state that returns are counted to is left for good, of the largest rate of leaving a state: so
+/// that what is subtracted for it is small beside the returns.
 constexpr Extended caught = 16;
 /// Of the rate, so much is taken for its rounding: sums of a few entries, some ten eliminations.
 constexpr Extended rate_rounding = 16 * rounding;
@@ -48,7 +49,9 @@ std::pair<Extended, std::uint32_t> slowest_return(const Generator& closed, const
                                                   std::uint32_t most_visited, const Heard& heard) {
   Generator caught_there = closed;
   std::fill(caught_there.kill.begin(), caught_there.kill.end(), Extended{0});
-  caught_there.kill[most_visited] = caught * caught_there.exit(most_visited);
+  Extended fastest = 0;
+  for (std::size_t i = 0; i < closed.size(); ++i) fastest = std::max(fastest, caught_there.exit(i));
+  caught_there.kill[most_visited] = caught * fastest;
   GeneratorSolver solver(caught_there, heard, stationary);
   const Row forwards = solver.solve(Row(closed.size(), 1)), backwards = solver.solve_left(stationary);
   const auto backwards_from = [&](std::uint32_t i) { return stationary[i] > 0 ? backwards[i] / stationary[i] : 0; };
