@@ -57,7 +57,7 @@ Command steps() {
           },
           "",
           {"metastable steps --slope 9.59 --friction 0.3,0.05",
-           "metastable steps --law settled --slope 9.59 --how-it-fails",
+           "metastable steps --law settled --slope 9.59 --legs 0.1519 --how-it-fails",
            "metastable steps --slope 9.59 --method integrated --sensitivities"}};
 }
 
@@ -79,7 +79,7 @@ Command compare() {
           "--legs 0.16; likewise --restitution, --friction, --contact-list, --initial-speed). All combinations are "
           "studied; the first values together are the setting that every other one is compared with.",
           {"metastable compare --slopes 7.02,9.59", "metastable compare --slope 9.59 --friction-mean 0.3,0.4,0.5",
-           "metastable compare --slope 9.59 --law published,settled"}};
+           "metastable compare --slope 9.59 --law published,coulomb"}};
 }
 
 }  // namespace
@@ -124,8 +124,8 @@ Command sweep_command(const Sharing* sharing) {
         run_sweep(request);
       },
       "",
-      {"metastable sweep --slope 6:10:0.5", "metastable sweep --slope 9.59 --friction-mean 0.2:0.5:0.05 --out mu.csv",
-       "metastable sweep --slope 8:10:1 --friction-sd 0.05,0.1 --out map.csv"}};
+      {"metastable sweep --slope 7:10:1.5", "metastable sweep --slope 9.59 --friction-mean 0.3:0.4:0.05 --out mu.csv",
+       "metastable sweep --slope 8:10:2 --friction-sd 0.05,0.1 --out map.csv"}};
 }
 
 namespace {
@@ -144,9 +144,9 @@ Command solve() {
             run_solve(solve_request(o, setting, line));
           },
           "",
-          {"metastable solve friction-mean --slope 9.59 --steps 100",
-           "metastable solve slope --survive 1000:0.9 --friction 0.3,0.05 --legs 0.1519 --law published",
-           "metastable solve friction-sd --slope 9.59 --friction 0.3 --survive 1000:0.9"}};
+          {"metastable solve friction-mean --slope 9.59 --steps 100 --method integrated",
+           "metastable solve slope --survive 1000:0.9 --friction 0.3,0.05 --legs 0.1519 --method integrated",
+           "metastable solve friction-sd --slope 9.59 --friction 0.3 --survive 1000:0.9 --method integrated"}};
 }
 
 Command report() {

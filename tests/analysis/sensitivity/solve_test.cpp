@@ -91,8 +91,8 @@ TEST(Solve, FindsTheSlopeThatNinetyPerCentSurvive) {
   Setting base = paper_setting(7.02, true);
   base.friction = {0.3, 0.05};
   base.steady_launch = true;
-  const Solution found =
-      solve(base, Parameter::slope, {Of::survival, 0.9, 1000}, {.from = 7, .to = 10, .points = 4}, {});
+  const Solution found = solve(base, Parameter::slope, {Of::survival, 0.9, 1000}, {.from = 7, .to = 10, .points = 4},
+                               {.method = Method::integrated});
   ASSERT_EQ(found.found.size(), 1U);
   EXPECT_NEAR(found.found[0].at.value, 8.214, 0.005);
   EXPECT_LT(found.found[0].at.lower, found.found[0].at.value);
