@@ -15,9 +15,9 @@
 #include "markov/mesh/mesh.h"
 #include "markov/mesh/mesh_passage.h"
 #include "markov/mesh/noise_frame.h"
-#include "markov/mesh/score_lattice.h"
 #include "markov/parallel.h"
 #include "markov/passage/last_steps.h"
+#include "markov/transition_rows/score_lattice.h"
 
 namespace metastable::analysis {
 namespace {

@@ -3,9 +3,9 @@
 #include <span>
 #include <utility>
 
-#include "markov/mesh/score_lattice.h"
 #include "markov/parallel.h"
 #include "markov/transition_rows/draws.h"
+#include "markov/transition_rows/score_lattice.h"
 
 namespace metastable::analysis {
 namespace {

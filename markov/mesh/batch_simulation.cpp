@@ -9,10 +9,10 @@
 #include <stdexcept>
 #include <utility>
 
-#include "markov/mesh/score_lattice.h"
 #include "markov/normal_95.h"
 #include "markov/parallel.h"
 #include "markov/transition_rows/draws.h"
+#include "markov/transition_rows/score_lattice.h"
 
 namespace metastable::markov {
 namespace {

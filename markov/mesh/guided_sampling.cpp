@@ -9,9 +9,9 @@
 #include <vector>
 
 #include "markov/mesh/mesh_passage.h"
-#include "markov/mesh/score_lattice.h"
 #include "markov/parallel.h"
 #include "markov/transition_rows/draws.h"
+#include "markov/transition_rows/score_lattice.h"
 
 namespace metastable::markov {
 namespace {

@@ -12,7 +12,7 @@
 #include "markov/mesh/mesh.h"
 #include "markov/mesh/node_lattice.h"
 #include "markov/mesh/score_curve.h"
-#include "markov/mesh/score_lattice.h"
+#include "markov/transition_rows/score_lattice.h"
 
 namespace metastable::markov {
 

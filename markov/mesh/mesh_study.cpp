@@ -17,9 +17,10 @@
 #include "markov/mesh/mesh_passage.h"
 #include "markov/mesh/noise_frame.h"
 #include "markov/mesh/other_gaits.h"
-#include "markov/mesh/score_lattice.h"
+#include "markov/mesh/study_orbit.h"
 #include "markov/normal_95.h"
 #include "markov/parallel.h"
+#include "markov/transition_rows/score_lattice.h"
 #include "markov/work_left.h"
 
 namespace metastable::markov {
@@ -47,13 +48,16 @@ constexpr double pilot_steps = 4;
 // States of a row where the chance of failing jumps, by dimension: of 32 in one dimension shifts differ by 4 per cent.
 constexpr std::array<int, 4> row_states_by_dimension{256, 32, 16, 16};
 constexpr double memory_side_by_side = 0.5;  // of all: for the meshes of a dear map that grow side by side
-constexpr std::size_t most_phases = 15;      // of a mesh
 constexpr double longest_trial_factor = 30;  // times the expected steps: one trial of 1e13 takes longer
 
 /// Returns the coarsest spacings that the extrapolation was found to bear, by dimension.
 double coarsest(int dimension) {
   constexpr std::array<double, 4> spacing{0.4, 0.5, 0.7, 1.0};
   return spacing[static_cast<std::size_t>(dimension - 1)];
+}
+
+double coarsest_spacing(const BatchMap& map, const MeshStudyOptions& options) {
+  return options.spacing > 0 ? options.spacing : coarsest(map.dimension);
 }
 
 /// Returns the value at 0 of the polynomial in h^2 through the logs of sizes first .. last - 1, h^2 halving from each
@@ -111,20 +115,11 @@ SimulationOptions walking(const MeshStudyOptions& options) {
   return {.seed = options.seed, .threads = options.threads, .most_steps = options.simulated_steps};
 }
 
-/// Holds the orbit or walk without noise that the meshes of a study lie around, and their frames.
-struct Around {
-  NoiseFreeOrbit orbit;
-  int period = 1;                         ///< MeshStudy::period
-  std::uint64_t fails_without_noise = 0;  ///< MeshStudy::fails_without_noise
-  std::vector<NoiseFrame> frames;         ///< of the meshes
-  GaitOrbit own;                          ///< states of phase 0 of a revolution of the meshes
-};
-
 /// Makes one study.
 class Run {
  public:
   /// @param map  as often round as a revolution of the meshes is
-  Run(const BatchMap& map, std::span<const double> start, const MeshStudyOptions& options, Around around)
+  Run(const BatchMap& map, std::span<const double> start, const MeshStudyOptions& options, StudyOrbit around)
       : map_(map),
         start_(start),
         options_(options),
@@ -187,8 +182,7 @@ class Run {
 
  private:
   MeshOptions mesh_options(std::size_t size, std::size_t shift) {
-    const double coarse = options_.spacing > 0 ? options_.spacing : coarsest(map_.dimension);
-    MeshOptions one{.spacing = coarse / std::pow(std::sqrt(2.0), static_cast<double>(size)),
+    MeshOptions one{.spacing = coarsest_spacing(map_, options_) / std::pow(std::sqrt(2.0), static_cast<double>(size)),
                     .seed = options_.seed,
                     .shift = static_cast<std::uint32_t>(shift),
                     .margin = options_.margin > 0 ? options_.margin
@@ -521,17 +515,8 @@ class Run {
   WorkLeft work_;
 };
 
-/// Returns whether nodes of all meshes reach as far as some states of phase 0.
-bool nodes_reach(const BatchMap& map, const std::vector<NoiseFrame>& frames, const GaitOrbit& states,
-                 const MeshStudyOptions& options) {
-  const double finest = (options.spacing > 0 ? options.spacing : coarsest(map.dimension)) / 2;
-  const NodeLattice lattice(frames, finest, {});
-  NodeLattice::Point point{};
-  return std::ranges::all_of(states, [&](const auto& state) { return lattice.locate(0, state.data(), point); });
-}
-
 MeshStudy study_around(const BatchMap& map, std::span<const double> start, const MeshStudyOptions& options,
-                       Around around) {
+                       StudyOrbit around) {
   try {
     return Run(map, start, options, std::move(around)).run();
   } catch (const NoFailureFound& error) {
@@ -545,59 +530,6 @@ MeshStudy study_around(const BatchMap& map, std::span<const double> start, const
     throw Disagreement(
         fmt::format("{}; {}: no number is given", error.what(), walks_in_words(map, start, walking(options)).first));
   }
-}
-
-Around around_orbit(NoiseFreeOrbit orbit) {
-  std::vector<NoiseFrame> frames = orbit.frames;
-  GaitOrbit own{frames.front().centre};
-  return {.orbit = std::move(orbit), .frames = std::move(frames), .own = std::move(own)};
-}
-
-Around around_walk(NoiseFreeWalk walk) {
-  return {.orbit = {walk.frames, {}},
-          .period = 0,
-          .fails_without_noise = walk.fails_after,
-          .frames = walk.frames,
-          .own = {walk.frames.front().centre}};
-}
-
-/// Returns nothing where walks that are pushed off the orbit do not come back.
-std::optional<NoiseFreeOrbit> orbit_over(const BatchMap& map, const PeriodicGait& gait) {
-  try {
-    return noise_free_orbit(over_revolutions(map, gait.period), gait.state);
-  } catch (const NoOrbit&) {
-    return std::nullopt;
-  }
-}
-
-/// Returns the frames of one mesh that holds all turns of a gait. Those of the last steps' response are as fine as
-/// shifts need; in three and four dimensions their nodes fill the memory, and the mean stationary ones are taken.
-/// @param frames  stationary, turn by turn
-std::vector<NoiseFrame> frames_of_turns(const BatchMap& map, const std::vector<NoiseFrame>& frames,
-                                        std::span<const double> on_it) {
-  if (map.dimension <= 2)
-    if (auto walk = noise_free_walk(map, on_it)) return std::move(walk->frames);
-  return common_frames(frames, map.phases);
-}
-
-MeshStudy study_of_gait(const BatchMap& map, std::span<const double> start, const MeshStudyOptions& options,
-                        NoiseFreeOrbit orbit, int period) {
-  Around around = around_orbit(std::move(orbit));
-  around.period = period;
-  if (period == 1) return study_around(map, start, options, std::move(around));
-  GaitOrbit turns;
-  for (std::size_t k = 0; k < around.frames.size(); k += static_cast<std::size_t>(map.phases))
-    turns.push_back(around.frames[k].centre);
-  std::vector<NoiseFrame> frames = frames_of_turns(map, around.frames, turns.front());
-  if (!nodes_reach(map, frames, turns, options)) {
-    if (around.frames.size() > most_phases)
-      throw MapError(
-          fmt::format("return map: its gait of {} revolutions is too wide for the nodes of one mesh", period));
-    return study_around(over_revolutions(map, period), start, options, std::move(around));
-  }
-  around.frames = std::move(frames);
-  around.own = std::move(turns);
-  return study_around(map, start, options, std::move(around));
 }
 
 }  // namespace
@@ -618,14 +550,16 @@ MeshStudy mesh_study(const BatchMap& map, std::span<const double> start, const M
   if (options.shifts < 6)
     throw std::invalid_argument(fmt::format("mesh study: {} shifts, 6 or more expected", options.shifts));
   try {
-    return study_around(map, start, options, around_orbit(noise_free_orbit(map, start)));
+    return study_around(map, start, options, orbit_of_start(map, start));
   } catch (const NoOrbit& error) {
-    if (const auto gait = periodic_gait(map, start))
-      if (auto orbit = orbit_over(map, *gait))
-        return study_of_gait(map, start, options, std::move(*orbit), gait->period);
+    if (auto around = orbit_of_gait(map, start, coarsest_spacing(map, options) / 2)) {
+      const int revolutions = around->revolutions;
+      return study_around(revolutions == 1 ? map : over_revolutions(map, revolutions), start, options,
+                          std::move(*around));
+    }
     if (options.simulated_steps == 0) throw;  // without a gait, a mesh alone does not vouch for its nodes
-    if (auto walk = noise_free_walk(map, start)) try {
-        return study_around(map, start, options, around_walk(std::move(*walk)));
+    if (auto walk = orbit_of_walk(map, start)) try {
+        return study_around(map, start, options, std::move(*walk));
       } catch (const MapError&) {  // nor is it a question about first passage: what follows is said of it
       }
     std::string walked;

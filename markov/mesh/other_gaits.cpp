@@ -8,8 +8,8 @@
 #include <limits>
 
 #include "markov/mesh/mesh_growth.h"
-#include "markov/mesh/score_lattice.h"
 #include "markov/transition_rows/draws.h"
+#include "markov/transition_rows/score_lattice.h"
 
 namespace metastable::markov {
 namespace {

@@ -10,9 +10,9 @@
 #include <vector>
 
 #include "markov/dense_matrix.h"
-#include "markov/mesh/score_lattice.h"
 #include "markov/splitting/learnt_level.h"
 #include "markov/splitting/stratified_scores.h"
+#include "markov/transition_rows/score_lattice.h"
 
 namespace metastable::markov {
 namespace {

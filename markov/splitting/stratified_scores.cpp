@@ -7,8 +7,8 @@
 #include <utility>
 #include <vector>
 
-#include "markov/mesh/score_lattice.h"
 #include "markov/transition_rows/draws.h"
+#include "markov/transition_rows/score_lattice.h"
 
 namespace metastable::markov {
 namespace {

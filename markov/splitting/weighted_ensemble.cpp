@@ -7,8 +7,8 @@
 #include <numeric>
 #include <utility>
 
-#include "markov/mesh/score_lattice.h"
 #include "markov/splitting/stratified_scores.h"
+#include "markov/transition_rows/score_lattice.h"
 
 namespace metastable::markov {
 namespace {

@@ -10,8 +10,8 @@
 #include <utility>
 
 #include "markov/mesh/batch_simulation.h"
-#include "markov/mesh/score_lattice.h"
 #include "markov/transition_rows/draws.h"
+#include "markov/transition_rows/score_lattice.h"
 #include "tests/markov/mesh/maps.h"
 #include "tests/message_of.h"
 

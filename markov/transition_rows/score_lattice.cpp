@@ -1,4 +1,4 @@
-#include "markov/mesh/score_lattice.h"
+#include "markov/transition_rows/score_lattice.h"
 
 #include <Random123/philox.h>
 #include <fmt/format.h>
