@@ -4,12 +4,12 @@
 
 #include <stdexcept>
 #include <string>
-#include <tuple>
 
 #include "analysis/experiment/experiment.h"
 #include "analysis/experiment/stand_in.h"
 #include "analysis/motion_capture/angle_file.h"
 #include "analysis/motion_capture/collision_finder.h"
+#include "tests/analysis/same_trials.h"
 #include "tests/message_of.h"
 
 namespace metastable::analysis::test {
@@ -81,19 +81,7 @@ void expect_same(const Experiment& a, const Experiment& b) {
     ASSERT_EQ(x.initial_speed.has_value(), y.initial_speed.has_value());
     EXPECT_TRUE(!x.initial_speed || same(*x.initial_speed, *y.initial_speed));
   }
-  ASSERT_EQ(a.trials.size(), b.trials.size());
-  for (std::size_t t = 0; t < a.trials.size(); ++t) {
-    const MeasuredTrial &x = a.trials[t], &y = b.trials[t];
-    EXPECT_EQ(x.number, y.number);
-    EXPECT_EQ(x.condition, y.condition);
-    EXPECT_EQ(x.outcome, y.outcome);
-    ASSERT_EQ(x.collisions.size(), y.collisions.size());
-    for (std::size_t k = 0; k < x.collisions.size(); ++k) {
-      const MeasuredCollision &c = x.collisions[k], &d = y.collisions[k];
-      EXPECT_EQ(std::tie(c.number, c.leg, c.time, c.position, c.omega_minus, c.omega_plus),
-                std::tie(d.number, d.leg, d.time, d.position, d.omega_minus, d.omega_plus));
-    }
-  }
+  metastable::test::expect_same_trials(a, b);
 }
 
 // They agree, with the digits of the files, for every subset of what may be left unsaid and for laws with a gyration.

@@ -5,7 +5,6 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
-#include <cmath>
 #include <filesystem>
 #include <numbers>
 #include <optional>
@@ -13,6 +12,7 @@
 #include <vector>
 
 #include "analysis/experiment/experiment.h"
+#include "tests/analysis/same_trials.h"
 #include "tests/reports/program.h"
 #include "tests/reports/support.h"
 
@@ -77,24 +77,7 @@ class Import : public InFolder {
   void expect_same(const Ran& ran, double close = 0) const {
     ASSERT_EQ(ran.code, 0) << ran.err;
     const Experiment read = analysis::read_experiment(folder_ / "out");
-    const auto same = [close](std::optional<double> a, std::optional<double> b) {
-      return a.has_value() == b.has_value() && (!a || std::abs(*a - *b) <= close * std::abs(*b));
-    };
-    ASSERT_EQ(read.trials.size(), known_.trials.size());
-    for (std::size_t t = 0; t < read.trials.size(); ++t) {
-      const MeasuredTrial &a = read.trials[t], &b = known_.trials[t];
-      EXPECT_EQ(a.number, b.number);
-      EXPECT_EQ(a.condition, b.condition);
-      EXPECT_EQ(a.outcome, b.outcome);
-      ASSERT_EQ(a.collisions.size(), b.collisions.size());
-      for (std::size_t i = 0; i < a.collisions.size(); ++i) {
-        const MeasuredCollision &c = a.collisions[i], &d = b.collisions[i];
-        EXPECT_EQ(c.leg, d.leg);
-        EXPECT_TRUE(c.number == d.number && same(c.time, d.time) && same(c.position, d.position) &&
-                    same(c.omega_minus, d.omega_minus) && same(c.omega_plus, d.omega_plus))
-            << "trial " << a.number << ", collision " << c.number;
-      }
-    }
+    metastable::test::expect_same_trials(read, known_, close);
   }
 
   void expect_refused(const Ran& ran, const std::string& said) const {
