@@ -24,9 +24,8 @@ std::string even_push_in_words(const TransitionModel& model, const Fit& recalibr
   for (std::size_t j = 0; j < columns.size(); ++j)
     by.push_back(fmt::format("{} {:+.2g}", columns[j].name, pushed.terms.back().values[j]));
   return fmt::format(
-      "The same push at every {} ({}), whatever causes it, fits as well (2 Δ ln L {:.0f}, beside {:.0f}): an effect "
-      "that "
-      "is not in the catalogue and pushes so would be given this name.",
+      "These data show no more of it than the same push at every {} ({}), which fits as well (2 Δ ln L {:.0f}, beside "
+      "{:.0f}): an effect outside the catalogue that pushes so would get this name.",
       model.step_name(), fmt::join(by, ", "), gain, of_best);
 }
 

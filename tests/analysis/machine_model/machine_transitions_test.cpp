@@ -52,6 +52,7 @@ TEST_P(WhatWasDone, IsNamedWithItsSize) {
   }
   ASSERT_EQ(d.verdict, Verdict::explained) << said(d);
   EXPECT_EQ(d.causes.set, std::vector<std::string>{done.cause}) << said(d);
+  EXPECT_EQ(d.causes.even_push, "");
   const EstimatedParameter& found = d.causes.ranked.front().parameters[0][0];
   EXPECT_LT(found.lower, done.size) << said(d);
   EXPECT_GT(found.upper, done.size) << said(d);
@@ -61,6 +62,24 @@ INSTANTIATE_TEST_SUITE_P(MachineTransitions, WhatWasDone,
                          testing::Values(Done{"nothing", 0, 0, 0, 0}, Done{"bend", -0.05, 0, 0, -0.05},
                                          Done{"b_drift", 0, 0.3, 0, 0.3}, Done{"b_spread", 0, 0, 0.15, 0.15}),
                          [](const auto& instance) { return std::string(instance.param.cause); });
+
+// What takes the same of every step has the form of a push: anything else that pushes would get its name.
+TEST(MachineTransitions, AnEffectThatIsAnEvenPushIsSaidToBeNoMore) {
+  Machine machine = linear_machine(0.05);
+  machine.parameters = {{"a", 0.8, 0.05}, {"s", 0.2, 0.05, 0.01, 2}};
+  machine.effects = {{"friction", {{"loss", 0, 0, 0.5}}}};
+  machine.may_vary.clear();
+  machine.step = [](const MachineBatch& batch) {
+    for (std::size_t i = 0; i < batch.rows; ++i)
+      batch.next[i] =
+          batch.value(0, i) * batch.states[i] + 0.3 + batch.value(1, i) * batch.scores[i] - batch.value(2, i);
+  };
+  const Diagnosis d = diagnosed(machine, scalar_runs(60, 20, 1.5, 0.05, 17, [](double x, double z, std::size_t) {
+                                  return 0.8 * x + 0.2 + 0.2 * z;
+                                }));
+  ASSERT_EQ(d.verdict, Verdict::explained) << said(d);
+  EXPECT_NE(d.causes.even_push.find("the same push at every step (x -0."), std::string::npos) << said(d);
+}
 
 // The machine fails where its noise is below an edge, whatever its state: in one step of so many.
 TEST(MachineTransitions, ExpectedStepsAreThoseOfItsChanceOfFailure) {
