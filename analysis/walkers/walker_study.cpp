@@ -6,21 +6,34 @@
 #include <numbers>
 #include <stdexcept>
 
+#include "dynamics/walkers/five_link_biped.h"
+#include "markov/mesh/noise_frame.h"
+
 namespace metastable::analysis {
 
 const char* terrain_name(dynamics::Terrain terrain) { return terrain == dynamics::Terrain::fresh ? "fresh" : "facets"; }
 
-const char* walker_name(Walker walker) { return walker == Walker::simplest ? "simplest" : "compass"; }
+const char* walker_name(Walker walker) {
+  switch (walker) {
+    case Walker::simplest:
+      return "simplest";
+    case Walker::compass:
+      return "compass";
+    case Walker::biped:
+      return "biped";
+  }
+  return "";
+}
 
 double walker_slope_deg(Walker walker) {
   constexpr double garcia_slope_deg = 0.5156620156177409;  // 0.009 rad
-  return walker == Walker::simplest ? garcia_slope_deg : 3;
+  return walker == Walker::simplest ? garcia_slope_deg : walker == Walker::compass ? 3 : 1;
 }
 
 Walker walker_from_name(const std::string& name) {
-  for (const Walker walker : {Walker::simplest, Walker::compass})
+  for (const Walker walker : {Walker::simplest, Walker::compass, Walker::biped})
     if (name == walker_name(walker)) return walker;
-  throw std::invalid_argument(fmt::format("walker: '{}' is none of simplest, compass", name));
+  throw std::invalid_argument(fmt::format("walker: '{}' is none of simplest, compass, biped", name));
 }
 
 dynamics::Terrain terrain_from_name(const std::string& name) {
@@ -29,12 +42,24 @@ dynamics::Terrain terrain_from_name(const std::string& name) {
   throw std::invalid_argument(fmt::format("terrain: '{}' is none of fresh, facets", name));
 }
 
-dynamics::WalkerMap WalkerSetting::map() const {
-  if (!(slope_deg > 0 && slope_deg < 45))
-    throw std::invalid_argument(fmt::format("slope: {:.6g} deg is outside (0, 45) deg", slope_deg));
-  if (!(slope_sd_deg > 0 && slope_sd_deg < 45))
+namespace {
+
+void require_ranges(const WalkerSetting& setting) {
+  if (!(setting.slope_deg > 0 && setting.slope_deg < 45))
+    throw std::invalid_argument(fmt::format("slope: {:.6g} deg is outside (0, 45) deg", setting.slope_deg));
+  if (!(setting.slope_sd_deg > 0 && setting.slope_sd_deg < 45))
     throw std::invalid_argument(
-        fmt::format("slope-sd: {:.6g} deg is outside (0, 45) deg (without noise nothing fails)", slope_sd_deg));
+        fmt::format("slope-sd: {:.6g} deg is outside (0, 45) deg (without noise nothing fails)", setting.slope_sd_deg));
+}
+
+}  // namespace
+
+dynamics::WalkerMap WalkerSetting::map() const {
+  require_ranges(*this);
+  if (walker == Walker::biped)
+    throw markov::TooManyDimensions(
+        fmt::format("walker: the biped has {} dimensions, where meshes hold 1 to {}; steps --method splitting takes it",
+                    dynamics::FiveLinkBiped::dimension, markov::most_mesh_dimensions));
   return {walker == Walker::simplest ? dynamics::TwoLinkWalker::simplest() : dynamics::TwoLinkWalker::compass(),
           {.slope_rad = slope_deg * degree, .slope_sd_rad = slope_sd_deg * degree, .terrain = terrain}};
 }
@@ -59,6 +84,38 @@ markov::BatchMap batch_map(const dynamics::WalkerMap& map) {
   return batch;
 }
 
+namespace {
+
+markov::BatchMap biped_map(const WalkerSetting& setting) {
+  if (setting.terrain != dynamics::Terrain::fresh)
+    throw std::invalid_argument("terrain: the biped walks on a plane that tilts anew at every step (fresh) only");
+  markov::BatchMap batch;
+  batch.dimension = dynamics::FiveLinkBiped::dimension;
+  batch.names = dynamics::FiveLinkBiped::names();
+  const double slope = setting.slope_deg * degree, sd = setting.slope_sd_deg * degree;
+  batch.step = [biped = dynamics::FiveLinkBiped(), slope, sd](int, auto states, auto scores, auto next, auto failed) {
+    std::vector<double> slopes;
+    for (const double score : scores) slopes.push_back(slope + sd * score);
+    biped.step(states, slopes, next, failed);
+  };
+  batch.inside = [](int, auto state) { return dynamics::FiveLinkBiped::inside(state); };
+  return batch;
+}
+
+}  // namespace
+
+markov::BatchMap batch_map(const WalkerSetting& setting) {
+  if (setting.walker != Walker::biped) return batch_map(setting.map());
+  require_ranges(setting);
+  return biped_map(setting);
+}
+
+std::vector<double> start_state(const WalkerSetting& setting) {
+  const double slope = setting.slope_deg * degree;
+  if (setting.walker == Walker::biped) return dynamics::FiveLinkBiped().gait(slope);
+  return gait_state(setting, dynamics::find_gait(setting.map().walker(), slope));
+}
+
 std::vector<double> gait_state(const WalkerSetting& setting, const dynamics::Gait& gait) {
   std::vector<double> state = gait.state;
   if (setting.terrain == dynamics::Terrain::facets) state.push_back(setting.slope_deg * degree);
@@ -74,9 +131,8 @@ WalkerStudy study_walker(const WalkerSetting& setting, const markov::MeshStudyOp
 }
 
 markov::SplittingStudy split_walker(const WalkerSetting& setting, const markov::SplittingOptions& options) {
-  const dynamics::WalkerMap map = setting.map();
-  const dynamics::Gait gait = dynamics::find_gait(map.walker(), setting.slope_deg * degree);
-  return markov::splitting_study(batch_map(map), gait_state(setting, gait), options);
+  const markov::BatchMap map = batch_map(setting);
+  return markov::splitting_study(map, start_state(setting), options);
 }
 
 }  // namespace metastable::analysis

@@ -15,9 +15,8 @@ constexpr std::uint64_t stream_of_walks = 0x7000;
 }  // namespace
 
 std::vector<Walk> simulate_walks(const WalkerSetting& setting, const WalkOptions& options) {
-  const markov::BatchMap batch = batch_map(setting.map());
-  const std::vector<double> start =
-      gait_state(setting, dynamics::find_gait(setting.map().walker(), setting.slope_deg * degree));
+  const markov::BatchMap batch = batch_map(setting);
+  const std::vector<double> start = start_state(setting);
   std::vector<Walk> walks(options.trials);
   const auto follow = [&](std::size_t trial) {
     Walk& walk = walks[trial];

@@ -342,6 +342,10 @@ WalkerRequest walker_simulate_request(const Options& o, const std::string& line)
     walker.reality = walker_reality(o);
     return walker;
   }
+  if (walker.settings.front().walker == analysis::Walker::biped) {
+    if (o.given("effect")) throw std::invalid_argument("--effect: has no meaning with --walker biped");
+    return walker;
+  }
   walker.effects = analysis::effects_of_walks(walker.settings.front(), o.all("effect"));
   return walker;
 }

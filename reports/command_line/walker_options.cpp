@@ -55,9 +55,9 @@ std::vector<double> slopes_in(const Options& o, const std::string& name) {
 
 void add_walker(Options& o, const std::string& sd, bool meshes) {
   o.group("Walkers on two legs (--walker)");
-  o.add("walker", "simplest|compass", "",
-        "A walker on two legs instead of the wheel (simplest: lengths in legs, times in sqrt(l/g)); slopes then "
-        "default to 0.009 rad and 3 deg, in " +
+  o.add("walker", "simplest|compass|biped", "",
+        "A walker on two legs instead of the wheel (simplest: lengths in legs, times in sqrt(l/g); biped: five links, "
+        "in `steps --method splitting` and `simulate` alone); slopes then default to 0.009 rad, 3 and 1 deg, in " +
             walker_slopes.text());
   o.add("slope-sd", sd, "", "With --walker: sd of the slope from step to step [deg], in " + walker_slopes.text());
   o.add(

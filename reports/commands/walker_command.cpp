@@ -83,7 +83,7 @@ WalkerAnswer answer_walker_steps(const WalkerRequest& request, const BeginPart& 
   const Tell tell = begin("how it fails");
   tell(0, "");
   answer.moments = answer.studies.empty()
-                       ? analysis::how_it_falls(analysis::batch_map(setting.map()), analysis::noises_of(setting),
+                       ? analysis::how_it_falls(analysis::batch_map(setting), analysis::noises_of(setting),
                                                 answer.splitting->passage)
                        : analysis::how_it_falls(setting, answer.studies.front(), request.study).moments;
   return answer;
@@ -222,10 +222,12 @@ void run_walker_simulate(const WalkerRequest& request) {
   for (const char* name : {"walks.csv", "steps.csv", "trials.csv", "experiment.toml"})
     if (std::filesystem::exists(folder / name))
       throw OutputError(folder, fmt::format("already holds {}; choose another folder", name));
-  if (setting.terrain != dynamics::Terrain::fresh && !request.effects.empty())
-    throw std::invalid_argument("--effect: has no meaning with --terrain facets");
+  const bool facets = setting.terrain != dynamics::Terrain::fresh;
+  if (facets && !request.effects.empty()) throw std::invalid_argument("--effect: has no meaning with --terrain facets");
+  const markov::BatchMap map = analysis::batch_map(setting);
   OutputFolder whole(folder);
-  if (setting.terrain == dynamics::Terrain::fresh || request.reality) return write_experiment(request, whole);
+  const bool biped = setting.walker == analysis::Walker::biped;
+  if (!(biped || facets) || request.reality) return write_experiment(request, whole);
   Answer answer(request.json);
   const std::vector<analysis::Walk> walks = [&] {
     ProgressParts progress;
@@ -236,7 +238,7 @@ void run_walker_simulate(const WalkerRequest& request) {
   const Provenance provenance = walker_provenance(request);
   std::string head, steps = "trial,step", trials = "trial,steps,outcome\n";
   for (const std::string& line : provenance_lines(provenance)) head += "# " + line + "\n";
-  for (const std::string& name : setting.map().names()) steps += "," + csv_field(name);
+  for (const std::string& name : map.names) steps += "," + csv_field(name);
   steps += ",slope met [deg]\n";
   std::size_t fallen = 0;
   for (std::size_t trial = 0; trial < walks.size(); ++trial) {

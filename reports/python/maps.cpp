@@ -246,7 +246,7 @@ py::dict simulate_walks(const py::dict& fields, const py::dict& options, const p
   std::vector<std::int64_t> trial, step, steps;
   std::vector<double> slope;
   std::vector<bool> fell;
-  const std::vector<std::string> names = setting.map().names();
+  const std::vector<std::string> names = analysis::batch_map(setting).names;
   std::vector<std::vector<double>> states(names.size());
   for (std::size_t t = 0; t < walks.size(); ++t) {
     steps.push_back(static_cast<std::int64_t>(walks[t].steps.size()));

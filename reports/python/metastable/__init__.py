@@ -134,12 +134,13 @@ class Setting:
 
 @dataclasses.dataclass(frozen=True, eq=True)
 class WalkerSetting:
-    """A passive walker on two legs on rough ground.
+    """A walker on two legs on rough ground.
 
-    walker        "simplest" (Garcia et al. 1998: lengths in legs, times in sqrt(l/g)) or "compass" (Goswami et al.
-                  1998)
+    walker        "simplest" (Garcia et al. 1998: lengths in legs, times in sqrt(l/g)) "compass" (Goswami et al.
+                  1998), or "biped", of five links, which study(method="splitting") and simulate() alone take
     slope_sd_deg  sd of the slope from step to step [deg], in (0, 45)
-    slope_deg     mean slope [deg], in (0, 45); None: 0.009 rad of the simplest, 3 deg of the compass
+    slope_deg     mean slope [deg], in (0, 45); None: 0.009 rad of the simplest, 3 deg of the compass, 1 deg of the
+                  biped
     terrain       "fresh": a plane that tilts anew at every step; "facets": the feet still stand on the last one
     """
 
@@ -173,6 +174,8 @@ class WalkerSetting:
         """
         if self.terrain != "fresh":
             raise InputError(f"terrain: '{self.terrain}' is no machine's: only fresh is")
+        if self.walker == "biped":
+            raise InputError("walker: 'biped' is none of simplest, compass, which can be machines")
         slope = self.slope_deg if self.slope_deg is not None else {"simplest": math.degrees(0.009), "compass": 3.0}[self.walker]
         fields = _fields(self)
 

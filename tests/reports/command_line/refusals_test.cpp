@@ -175,7 +175,7 @@ TEST_F(Refusals, OfWrongWordsHintAtTheNearest) {
        "--tolerance: has a meaning under --method splitting only"},
       {{"steps", "--method", "splitting"}, "method: 'splitting' is neither 'sampled' nor 'integrated', which wheels have"},
       {{"steps", "--walker", "compas", "--slope-sd", "1"},
-       "--walker: 'compas' is none of simplest, compass; did you mean 'compass'?"},
+       "--walker: 'compas' is none of simplest, compass, biped; did you mean 'compass'?"},
       {{"blind", "opne", "run"}, "ACTION: 'opne' is none of make, answer, open; did you mean 'open'?"},
       {{"blind", "shut", "run"}, "ACTION: 'shut' is none of make, answer, open"},
       {{"completion", "fihs"}, "SHELL: 'fihs' is none of bash, zsh, fish; did you mean 'fish'?"},

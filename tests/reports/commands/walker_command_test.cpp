@@ -114,10 +114,29 @@ TEST_F(WalkerCommand, SweepIsTakenUpAgain) {
   EXPECT_NE(again.out.find("1 taken over"), std::string::npos) << again.out << again.err;
 }
 
+TEST_F(WalkerCommand, ABipedIsWalkedWithoutAMesh) {
+  const std::vector<std::string> biped{"--walker", "biped", "--slope-sd", "3"};
+  const auto asked = [&](std::vector<std::string> words, const std::vector<std::string>& more) {
+    words.insert(words.end(), biped.begin(), biped.end());
+    words.insert(words.end(), more.begin(), more.end());
+    return metastable(words);
+  };
+  for (const Ran& meshed : {asked({"steps"}, {}), asked({"report"}, {"--out", path("report")})}) {
+    EXPECT_EQ(meshed.code, 2);
+    EXPECT_NE(meshed.err.find("the biped has 9 dimensions, where meshes hold 1 to 4"), std::string::npos) << meshed.err;
+  }
+  const Ran ran = asked({"simulate"}, {"--trials", "20", "--out", path("walks")});
+  ASSERT_EQ(ran.code, 0) << ran.err;
+  EXPECT_NE(read(path("walks/walks.csv")).find("half angle [rad],stance knee [rad],"), std::string::npos);
+  const Ran effect = asked({"simulate"}, {"--effect", "hip_damping:damping=1", "--out", path("other")});
+  EXPECT_EQ(effect.code, 2);
+  EXPECT_NE(effect.err.find("--effect: has no meaning with --walker biped"), std::string::npos) << effect.err;
+}
+
 TEST_F(WalkerCommand, RefusesWhatHasNoMeaning) {
   const std::vector<std::pair<std::vector<std::string>, std::string>> cases = {
       {{"steps", "--walker", "simplest"}, "--slope-sd: is needed with --walker"},
-      {{"steps", "--walker", "biped", "--slope-sd", "1"}, "--walker: 'biped' is none of simplest, compass"},
+      {{"steps", "--walker", "hopper", "--slope-sd", "1"}, "--walker: 'hopper' is none of simplest, compass, biped"},
       {walker("steps", {"--slope", "50"}), "--slope: 50 is outside (0, 45)"},
       {walker("steps", {"--friction", "0.3"}), "--friction: has no meaning with --walker"},
       {walker("steps", {"--certify"}), "--certify: has no meaning with --walker"},
