@@ -6,13 +6,14 @@
 #include <array>
 #include <cmath>
 #include <limits>
-#include <numbers>
 #include <vector>
+
+#include "tests/dynamics/support.h"
 
 namespace metastable::dynamics::test {
 namespace {
 
-constexpr double degree = std::numbers::pi / 180, slope = 1 * degree;
+constexpr double usual_slope = 1 * degree;
 
 // Shifts the gait's state by as much as slopes of some degrees do.
 std::vector<double> shifted(std::vector<double> state, double by) {
@@ -25,7 +26,7 @@ struct Landing {
   bool fell;
   std::vector<double> next;
 };
-Landing stepped(const FiveLinkBiped& biped, const std::vector<double>& state, double ground = slope) {
+Landing stepped(const FiveLinkBiped& biped, const std::vector<double>& state, double ground = usual_slope) {
   Landing landing{false, std::vector<double>(9)};
   std::uint8_t fell = 0;
   biped.step(state, {&ground, 1}, landing.next, {&fell, 1});
@@ -64,7 +65,8 @@ class Ruler {
   }
   double potential() const {
     double sum = 0;
-    for (const Body& b : bodies_) sum += o_.gravity * b.mass * (b.y * std::cos(slope) - b.x * std::sin(slope));
+    for (const Body& b : bodies_)
+      sum += o_.gravity * b.mass * (b.y * std::cos(usual_slope) - b.x * std::sin(usual_slope));
     return sum;
   }
   /// Returns the angular momentum, turning forward, of some links about a point.
@@ -97,30 +99,30 @@ class Ruler {
 TEST(FiveLinkBiped, MotorsDoWhatTheEnergyGains) {
   const FiveLinkBiped biped;
   for (const double by : {0.0, 0.1, -0.15}) {
-    const auto state = shifted(biped.gait(slope), by);
-    const auto before = biped.before_strike(state, slope);
+    const auto state = shifted(biped.gait(usual_slope), by);
+    const auto before = biped.before_strike(state, usual_slope);
     ASSERT_TRUE(before) << by;
     BipedMotion m = biped.motion(state);
-    const double start = biped.energy(m, slope);
+    const double start = biped.energy(m, usual_slope);
     constexpr int pieces = 2000;
     const double h = before->time / pieces;
     double work = 0;
     for (int i = 0; i <= pieces; ++i) {  // by Simpson's rule
-      const double power = biped.power(m, biped.torques(m, slope));
+      const double power = biped.power(m, biped.torques(m, usual_slope));
       work += h / 3 * (i == 0 || i == pieces ? 1 : i % 2 == 1 ? 4 : 2) * power;
-      if (i < pieces) m = biped.moved(m, slope, h, h);
+      if (i < pieces) m = biped.moved(m, usual_slope, h, h);
     }
     EXPECT_GT(std::abs(work), 1);
-    EXPECT_NEAR(biped.energy(m, slope) - start, work, 1e-6) << by;
+    EXPECT_NEAR(biped.energy(m, usual_slope) - start, work, 1e-6) << by;
     const Ruler ruler(biped, m);
-    EXPECT_NEAR(biped.energy(m, slope), ruler.kinetic() + ruler.potential(), 1e-10);
+    EXPECT_NEAR(biped.energy(m, usual_slope), ruler.kinetic() + ruler.potential(), 1e-10);
   }
 }
 
 TEST(FiveLinkBiped, StrikesKeepMomentaAboutEveryJoint) {
   const FiveLinkBiped biped;
   for (const double by : {0.0, 0.1, -0.15}) {
-    const auto before = biped.before_strike(shifted(biped.gait(slope), by), slope);
+    const auto before = biped.before_strike(shifted(biped.gait(usual_slope), by), usual_slope);
     ASSERT_TRUE(before) << by;
     const BipedMotion struck = biped.strike(*before);
     const Ruler old(biped, *before), now(biped, struck);
@@ -142,7 +144,7 @@ TEST(FiveLinkBiped, StrikesKeepMomentaAboutEveryJoint) {
 
 TEST(FiveLinkBiped, ComesBackToItsGait) {
   const FiveLinkBiped biped;
-  for (const double ground : {0.5 * degree, slope, 3 * degree}) {
+  for (const double ground : {0.5 * degree, usual_slope, 3 * degree}) {
     const std::vector<double> gait = biped.gait(ground);
     std::vector<double> state = shifted(gait, 0.1);
     for (int i = 0; i < 70; ++i) {
@@ -157,7 +159,7 @@ TEST(FiveLinkBiped, ComesBackToItsGait) {
 
 TEST(FiveLinkBiped, StatesAreMotions) {
   const FiveLinkBiped biped;
-  const auto state = shifted(biped.gait(slope), 0.4);
+  const auto state = shifted(biped.gait(usual_slope), 0.4);
   const BipedMotion m = biped.motion(state);
   EXPECT_NEAR(biped.swing_foot(m)[1], 0, 1e-15);
   EXPECT_LT(biped.swing_foot(m)[0], -0.2);
@@ -169,10 +171,10 @@ TEST(FiveLinkBiped, StatesAreMotions) {
 TEST(FiveLinkBiped, PiecesOfTheMapAreShortEnough) {
   const FiveLinkBiped biped;
   for (const double by : {0.0, 0.15, -0.15}) {
-    const auto state = shifted(biped.gait(slope), by);
-    const auto before = biped.before_strike(state, slope);
+    const auto state = shifted(biped.gait(usual_slope), by);
+    const auto before = biped.before_strike(state, usual_slope);
     ASSERT_TRUE(before) << by;
-    const BipedMotion fine = biped.moved(biped.motion(state), slope, before->time, 1e-3);
+    const BipedMotion fine = biped.moved(biped.motion(state), usual_slope, before->time, 1e-3);
     for (std::size_t i = 0; i < 5; ++i) {
       EXPECT_NEAR(before->angles[i], fine.angles[i], 2e-5);
       EXPECT_NEAR(before->rates[i], fine.rates[i], 5e-4);
@@ -182,7 +184,7 @@ TEST(FiveLinkBiped, PiecesOfTheMapAreShortEnough) {
 
 TEST(FiveLinkBiped, FallsWhereItCannotWalk) {
   const FiveLinkBiped biped;
-  const std::vector<double> gait = biped.gait(slope);
+  const std::vector<double> gait = biped.gait(usual_slope);
   EXPECT_TRUE(stepped(biped, gait, -12 * degree).fell) << "it falls back";
   std::vector<double> slow = gait;
   for (std::size_t i = 4; i < 9; ++i) slow[i] *= 0.3;
@@ -194,11 +196,11 @@ TEST(FiveLinkBiped, FallsWhereItCannotWalk) {
 
 TEST(FiveLinkBiped, DoesNotDependOnItsNeighbours) {
   const FiveLinkBiped biped;
-  const std::vector<double> gait = biped.gait(slope), other = shifted(gait, 0.1);
+  const std::vector<double> gait = biped.gait(usual_slope), other = shifted(gait, 0.1);
   std::vector<double> both(other), next(18);
   both.insert(both.end(), gait.begin(), gait.end());
   std::vector<std::uint8_t> fell(2);
-  biped.step(both, std::vector{2 * degree, slope}, next, fell);
+  biped.step(both, std::vector{2 * degree, usual_slope}, next, fell);
   const Landing alone = stepped(biped, gait);
   EXPECT_EQ(fell, std::vector<std::uint8_t>(2));
   EXPECT_TRUE(std::ranges::equal(std::span(next).last(9), alone.next));
@@ -212,13 +214,13 @@ TEST(FiveLinkBiped, NamesWhatIsOutOfRange) {
   options.posture.swing_share = 1.1;
   EXPECT_THROW(FiveLinkBiped{options}, std::invalid_argument);
   const FiveLinkBiped biped;
-  std::vector<double> state = biped.gait(slope);
+  std::vector<double> state = biped.gait(usual_slope);
   EXPECT_THROW(stepped(biped, state, std::numeric_limits<double>::quiet_NaN()), std::invalid_argument);
   state[0] = -0.1;
   EXPECT_THROW(stepped(biped, state), std::invalid_argument);
   std::vector<double> next(9);
   std::vector<std::uint8_t> fell(2);
-  EXPECT_THROW(biped.step(state, std::vector{slope}, next, fell), std::invalid_argument);
+  EXPECT_THROW(biped.step(state, std::vector{usual_slope}, next, fell), std::invalid_argument);
 }
 
 }  // namespace
