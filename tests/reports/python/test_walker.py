@@ -155,6 +155,16 @@ class Steps(unittest.TestCase):
         with self.assertRaisesRegex(metastable.InputError, "spacing: has no meaning under method splitting"):
             walker.study(method="splitting", spacing=1)
 
+    def test_a_biped_is_walked_without_a_mesh(self):
+        biped = metastable.WalkerSetting("biped", slope_sd_deg=3)
+        with self.assertRaisesRegex(metastable.InputError, "the biped has 9 dimensions, where meshes hold 1 to 4"):
+            metastable.study(biped)
+        walks = metastable.simulate(biped, trials=40, seed=2)
+        self.assertIn("swing shank rate [rad/s]", list(walks))
+        self.assertTrue(walks.fell.all())
+        with self.assertRaisesRegex(metastable.InputError, "'biped' is none of simplest, compass"):
+            biped.machine(sensor={})
+
     def test_slips_to_another_gait_count(self):
         def gaits(state, noise):  # 7.207e5 steps by elimination of fine cells
             following = np.tanh(3 * state) + 0.2 * noise
