@@ -39,7 +39,7 @@ def rounded(ratio):
 
 
 def line(question, here, peer, ratio, words):
-    return [question, here, peer, rounded(ratio) if isinstance(ratio, float) else ratio, f"{BENCH} {words}"]
+    return [question, here, peer, rounded(ratio) if isinstance(ratio, float) else ratio, f"`{BENCH} {words}`"]
 
 
 def sampled_and_integrated(build):
