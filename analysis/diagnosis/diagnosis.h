@@ -171,7 +171,7 @@ struct Diagnosis {
     std::vector<std::string> alike;
     std::vector<StepwiseChoice> stepwise;  ///< what the field's usual selection names, for comparison
     std::string size;                      ///< of the likeliest beside the nominal model, a sentence; or empty
-    std::string even_push;                 ///< that a push alone fits as well, a sentence; or empty
+    std::string even_push;                 ///< a sentence that says that a push fits as well; or empty
     /// These are probabilities. A gap has at least even odds where the tests find one, else at most even ones.
     double p_no_gap = 0, p_recalibrate = 0, p_none = 0;
     double together = 1;          ///< of the best hypothesis, if of several effects: see Rules::most_together

@@ -21,8 +21,8 @@ struct MachineVariation {
 /// the phase, the order of trials, the step number, the place, the clock and the labels.
 std::vector<MachineVariation> machine_variations(const Machine& machine, std::shared_ptr<const MachineDesign> design);
 
-/// Returns what no variation is, as parameters and effects are there for it: every state is pushed by a number of its
-/// own, the same at every step.
+/// Returns the push of every measured state by a number of its own, the same at every step. It is not among the
+/// variations: a shift of the mean is what parameters and effects are fitted by.
 MachineVariation even_push(const Machine& machine, std::shared_ptr<const MachineDesign> design);
 
 }  // namespace metastable::analysis

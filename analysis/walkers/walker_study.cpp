@@ -10,6 +10,33 @@
 #include "markov/mesh/noise_frame.h"
 
 namespace metastable::analysis {
+namespace {
+
+void require_ranges(const WalkerSetting& setting) {
+  if (!(setting.slope_deg > 0 && setting.slope_deg < 45))
+    throw std::invalid_argument(fmt::format("slope: {:.6g} deg is outside (0, 45) deg", setting.slope_deg));
+  if (!(setting.slope_sd_deg > 0 && setting.slope_sd_deg < 45))
+    throw std::invalid_argument(
+        fmt::format("slope-sd: {:.6g} deg is outside (0, 45) deg (without noise nothing fails)", setting.slope_sd_deg));
+}
+
+markov::BatchMap biped_map(const WalkerSetting& setting) {
+  if (setting.terrain != dynamics::Terrain::fresh)
+    throw std::invalid_argument("terrain: the biped walks on a plane that tilts anew at every step (fresh) only");
+  markov::BatchMap batch;
+  batch.dimension = dynamics::FiveLinkBiped::dimension;
+  batch.names = dynamics::FiveLinkBiped::names();
+  const double slope = setting.slope_deg * degree, sd = setting.slope_sd_deg * degree;
+  batch.step = [biped = dynamics::FiveLinkBiped(), slope, sd](int, auto states, auto scores, auto next, auto failed) {
+    std::vector<double> slopes;
+    for (const double score : scores) slopes.push_back(slope + sd * score);
+    biped.step(states, slopes, next, failed);
+  };
+  batch.inside = [](int, auto state) { return dynamics::FiveLinkBiped::inside(state); };
+  return batch;
+}
+
+}  // namespace
 
 const char* terrain_name(dynamics::Terrain terrain) { return terrain == dynamics::Terrain::fresh ? "fresh" : "facets"; }
 
@@ -42,18 +69,6 @@ dynamics::Terrain terrain_from_name(const std::string& name) {
   throw std::invalid_argument(fmt::format("terrain: '{}' is none of fresh, facets", name));
 }
 
-namespace {
-
-void require_ranges(const WalkerSetting& setting) {
-  if (!(setting.slope_deg > 0 && setting.slope_deg < 45))
-    throw std::invalid_argument(fmt::format("slope: {:.6g} deg is outside (0, 45) deg", setting.slope_deg));
-  if (!(setting.slope_sd_deg > 0 && setting.slope_sd_deg < 45))
-    throw std::invalid_argument(
-        fmt::format("slope-sd: {:.6g} deg is outside (0, 45) deg (without noise nothing fails)", setting.slope_sd_deg));
-}
-
-}  // namespace
-
 dynamics::WalkerMap WalkerSetting::map() const {
   require_ranges(*this);
   if (walker == Walker::biped)
@@ -83,26 +98,6 @@ markov::BatchMap batch_map(const dynamics::WalkerMap& map) {
   batch.inside = [inside](int, auto state) { return inside(state); };
   return batch;
 }
-
-namespace {
-
-markov::BatchMap biped_map(const WalkerSetting& setting) {
-  if (setting.terrain != dynamics::Terrain::fresh)
-    throw std::invalid_argument("terrain: the biped walks on a plane that tilts anew at every step (fresh) only");
-  markov::BatchMap batch;
-  batch.dimension = dynamics::FiveLinkBiped::dimension;
-  batch.names = dynamics::FiveLinkBiped::names();
-  const double slope = setting.slope_deg * degree, sd = setting.slope_sd_deg * degree;
-  batch.step = [biped = dynamics::FiveLinkBiped(), slope, sd](int, auto states, auto scores, auto next, auto failed) {
-    std::vector<double> slopes;
-    for (const double score : scores) slopes.push_back(slope + sd * score);
-    biped.step(states, slopes, next, failed);
-  };
-  batch.inside = [](int, auto state) { return dynamics::FiveLinkBiped::inside(state); };
-  return batch;
-}
-
-}  // namespace
 
 markov::BatchMap batch_map(const WalkerSetting& setting) {
   if (setting.walker != Walker::biped) return batch_map(setting.map());

@@ -201,7 +201,7 @@ void FiveLinkBiped::step(std::span<const double> states, std::span<const double>
 }
 
 std::vector<double> FiveLinkBiped::gait(double slope) const {
-  // What the map of the usual posture came to on 1 deg.
+  // The iteration begins near the gait that the default posture has on a slope of 1 deg.
   std::array<double, 9> state{0.298, 0.054, 0.238, 0.146, 2.202, 0.128, 0.046, 1.266, 1.112}, next{};
   constexpr double known_slope = std::numbers::pi / 180, most_at_once = known_slope / 4, accuracy = 1e-11;
   const auto pieces = static_cast<int>(std::ceil(std::abs(slope - known_slope) / most_at_once));

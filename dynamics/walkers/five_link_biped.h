@@ -20,9 +20,9 @@ struct BipedLink {
   double inertia = 0;        ///< about the centre of mass [kg m^2], > 0
 };
 
-/// Holds all numbers of a biped. The links are those of RABBIT as Westervelt, Grizzle and Koditschek (2003, "Hybrid
-/// zero dynamics of planar biped walkers", IEEE Transactions on Automatic Control 48) give them, gears and motors
-/// included.
+/// Holds all numbers of a biped. The links are those of RABBIT in the set that the five-link demonstration of OptimTraj
+/// (M. Kelly) quotes from Westervelt, Grizzle and Koditschek (2003, "Hybrid zero dynamics of planar biped walkers",
+/// IEEE Transactions on Automatic Control 48). Other simulators have a torso of 12 kg and smaller inertias.
 struct BipedOptions {
   BipedLink shank{3.2, 0.128, 0.93}, thigh{6.8, 0.163, 1.08}, torso{20, 0.2, 2.22};
   double segment_length = 0.4;  ///< of a shank, and of a thigh [m]
@@ -36,9 +36,9 @@ struct BipedOptions {
 /// States are nine numbers just after a strike, in the frame of the slope ahead: half the angle between the legs, the
 /// bend of the stance and of the swing knee, the torso's angle [rad] and the five rates [rad/s]. Both feet are on the
 /// ground. The walker falls where the swing foot touches the ground before it has passed the stance foot (it falls
-/// back, or scuffs), where the foot that is to leave presses on after a strike, where stance leg or torso lies down or
-/// a knee breaks (1.2 rad of either to the normal, knees beyond 0.5 and 2.5 rad), or where no strike comes within 3 s.
-/// The ground is taken to hold the stance foot whatever the force.
+/// back, or scuffs), where the foot that is to leave presses on after a strike, where stance leg or torso lies down
+/// (1.2 rad from the normal), where a knee bends by less than -0.5 or more than 2.5 rad, or where no strike comes
+/// within 3 s. The ground is taken to hold the stance foot whatever the force.
 class FiveLinkBiped {
  public:
   static constexpr int dimension = 9;
@@ -74,8 +74,8 @@ class FiveLinkBiped {
   /// Returns forward position and height of the swing foot from the stance foot [m].
   std::array<double, 2> swing_foot(const BipedMotion& motion) const;
 
-  /// Returns the state of the stable gait that the walker comes to on even ground, by iteration from a state near that
-  /// of the usual posture on 1 deg, to 1e-11.
+  /// Returns the state of the stable gait that the walker comes to on even ground, by iteration to
+  /// 1e-11 from near the gait on 1 deg, the slope being changed in steps of a quarter of a degree.
   /// @throws std::domain_error if it falls or does not come to rest in one within 3000 steps
   std::vector<double> gait(double slope) const;
 

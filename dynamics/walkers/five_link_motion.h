@@ -18,8 +18,8 @@ struct BipedMotor {
 };
 
 /// Holds what the motors are told: postures as functions of the stance leg's angle to the vertical. Legs are lines from
-/// foot to hip. The usual numbers come from postures and gains drawn at random, most of which walk stably on level
-/// ground: one of them, rounded, with springs as soft as leaves four eigenvalues of a step's derivative above 0.2.
+/// foot to hip. The default numbers are one of many postures and gains drawn at random, rounded; most of those drawn
+/// walk stably on level ground. Its springs are so soft that four eigenvalues of a step's derivative exceed 0.2.
 struct BipedPosture {
   double half_step_rad = 0.25;  ///< > 0: the stance leg is meant to go from minus this angle to this angle
   double swing_share = 0.75;    ///< of that way after which the swing leg is in front, in (0, 1]

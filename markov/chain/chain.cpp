@@ -39,7 +39,9 @@ void spread_backwards(const Incoming& into, std::vector<std::uint8_t>& marked) {
 
 std::string describe(const std::string& solver, double residual, const std::string& detail) {
   std::ostringstream message;
-  message << solver << " did not converge: residual " << residual << ": " << detail;
+  message << solver << " did not converge: ";
+  if (!std::isnan(residual)) message << "residual " << residual << ": ";
+  message << detail;
   return message.str();
 }
 

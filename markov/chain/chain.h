@@ -13,6 +13,7 @@ namespace metastable::markov {
 /// A solver throws it where it did not reach its accuracy. The command line turns it into exit code 3.
 class ConvergenceError : public std::runtime_error {
  public:
+  /// @param residual  NaN: there is none to tell of
   ConvergenceError(std::string solver, double residual, const std::string& detail);
   const std::string& solver() const { return solver_; }
   double residual() const { return residual_; }

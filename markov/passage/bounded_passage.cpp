@@ -16,10 +16,9 @@ using Row = std::vector<Extended>;
 constexpr Extended extended_rounding = std::numeric_limits<Extended>::epsilon();
 constexpr double outwards = 4 * std::numeric_limits<double>::epsilon();  // a bound as a double
 constexpr double narrow = 1e-9;                                          // bounds that are not refined
-constexpr double enough = 1e-12;  // width of the bounds of a rate that need not be narrower
-constexpr int most_sweeps = 300;  // of a probability
-constexpr int most_refined =
-    4;  // corrections of a mean or a variance; each leaves a thousandth where a group is hardly left
+constexpr double enough = 1e-12;    // width of the bounds of a rate that need not be narrower
+constexpr int most_sweeps = 300;    // of a probability
+constexpr int most_refined = 4;     // corrections of a mean or a variance; where groups mix slowly each leaves 1e-3
 constexpr Extended swept = 1e-17L;  // residual, of what leaves the state
 
 /// v_i - sum q_ij v_j as a sum of products, and what its rounding may be.

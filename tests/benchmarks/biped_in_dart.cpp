@@ -169,8 +169,7 @@ int main(int argc, char** argv) {
   }
   fmt::print(
       "{} of {} drawn states reach a strike. Largest differences [rad, rad/s]: {:.1e} in a stance phase, {:.1e} in "
-      "that of "
-      "the map's own pieces, {:.1e} after a strike.\n",
+      "that of the map's own pieces, {:.1e} after a strike.\n",
       walked, states, phases, steps, strikes);
   return walked > 0 && phases < 1e-9 && steps < 1e-3 && strikes < 1e-9 ? 0 : 1;
 }

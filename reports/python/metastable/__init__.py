@@ -136,8 +136,8 @@ class Setting:
 class WalkerSetting:
     """A walker on two legs on rough ground.
 
-    walker        "simplest" (Garcia et al. 1998: lengths in legs, times in sqrt(l/g)) "compass" (Goswami et al.
-                  1998), or "biped", of five links, which study(method="splitting") and simulate() alone take
+    walker        "simplest" (Garcia et al. 1998: lengths in legs, times in sqrt(l/g)), "compass" (Goswami et
+                  al. 1998), or "biped", of five links, which only study(method="splitting") and simulate() take
     slope_sd_deg  sd of the slope from step to step [deg], in (0, 45)
     slope_deg     mean slope [deg], in (0, 45); None: 0.009 rad of the simplest, 3 deg of the compass, 1 deg of the
                   biped

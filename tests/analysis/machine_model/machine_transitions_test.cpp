@@ -63,7 +63,8 @@ INSTANTIATE_TEST_SUITE_P(MachineTransitions, WhatWasDone,
                                          Done{"b_drift", 0, 0.3, 0, 0.3}, Done{"b_spread", 0, 0, 0.15, 0.15}),
                          [](const auto& instance) { return std::string(instance.param.cause); });
 
-// What takes the same of every step has the form of a push: anything else that pushes would get its name.
+// An effect that takes the same amount off every step is a constant push of the state. Any other cause of such a push
+// would be given its name, and the answer has to say so.
 TEST(MachineTransitions, AnEffectThatIsAnEvenPushIsSaidToBeNoMore) {
   Machine machine = linear_machine(0.05);
   machine.parameters = {{"a", 0.8, 0.05}, {"s", 0.2, 0.05, 0.01, 2}};
@@ -81,18 +82,25 @@ TEST(MachineTransitions, AnEffectThatIsAnEvenPushIsSaidToBeNoMore) {
   EXPECT_NE(d.causes.even_push.find("the same push at every step (x -0."), std::string::npos) << said(d);
 }
 
-// The machine fails where its noise is below an edge, whatever its state: in one step of so many.
-TEST(MachineTransitions, ExpectedStepsAreThoseOfItsChanceOfFailure) {
-  Machine machine = linear_machine(0.05);
+// Returns a machine whose only parameter is the edge at which it fails.
+template <class Step>
+Machine failing_machine(double error, double edge, Step step) {
+  Machine machine = linear_machine(error);
   machine.effects.clear();
   machine.may_vary.clear();
-  machine.parameters = {{"edge", -2, 0.1}};
-  machine.step = [](const MachineBatch& batch) {
+  machine.parameters = {{"edge", edge, 0.1}};
+  machine.step = step;
+  return machine;
+}
+
+// The machine fails where its noise is below an edge, whatever its state: in one step of so many.
+TEST(MachineTransitions, ExpectedStepsAreThoseOfItsChanceOfFailure) {
+  const Machine machine = failing_machine(0.05, -2, [](const MachineBatch& batch) {
     for (std::size_t i = 0; i < batch.rows; ++i) {
       batch.next[i] = batch.states[i] / 2 + 1 + batch.scores[i] / 2;
       batch.failed[i] = batch.scores[i] < batch.value(0, i);
     }
-  };
+  });
   MachineRuns runs =
       scalar_runs(12, 10, 2.0, 0.05, 11, [](double x, double z, std::size_t) { return x / 2 + 1 + std::abs(z) / 2; });
   runs.trials[0].outcome = MachineOutcome::failed;
@@ -109,16 +117,12 @@ TEST(MachineTransitions, ExpectedStepsAreThoseOfItsChanceOfFailure) {
 // vary, not that one of them did. The rate of many such experiments is met, and launches drawn again say how little 30
 // know of it.
 TEST(MachineTransitions, ExpectedStepsKnowLaunchesFromAFewTrials) {
-  Machine machine = linear_machine(0.01);
-  machine.effects.clear();
-  machine.may_vary.clear();
-  machine.parameters = {{"edge", -1.5, 0.1}};
-  machine.step = [](const MachineBatch& batch) {
+  const Machine machine = failing_machine(0.01, -1.5, [](const MachineBatch& batch) {
     for (std::size_t i = 0; i < batch.rows; ++i) {
       batch.next[i] = 10 + batch.scores[i];
       batch.failed[i] = batch.states[i] < batch.value(0, i);
     }
-  };
+  });
   std::vector<double> logs, within;
   for (std::uint64_t experiment = 0; experiment < 16; ++experiment) {
     MachineRuns runs =
