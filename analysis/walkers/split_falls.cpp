@@ -78,10 +78,9 @@ LastMoments how_it_falls(const markov::BatchMap& map, const std::vector<NamedNoi
   for (std::size_t k = moments.state_names.size(); k < walks.dimension; ++k)
     moments.state_names.push_back("x" + std::to_string(k + 1));
   for (const NamedNoise& noise : noises) moments.noise_names.push_back(noise.name);
-  if (walks.size() == 0) {
-    moments.reason = "no walk was long enough";
-    return moments;
-  }
+  if (walks.size() == 0) moments.reason = "no walk was long enough";
+  if (study.all_failed) moments.reason = "walks fail before the start is forgotten, so that no regime stands beside them";
+  if (!moments.reason.empty()) return moments;
   moments.by_phase.assign(static_cast<std::size_t>(map.phases), 0.0);
   double all = 0;
   for (const double weight : walks.weights) all += weight;

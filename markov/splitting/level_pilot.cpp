@@ -19,8 +19,10 @@ namespace {
 
 constexpr int refinements = 3;
 constexpr std::uint64_t enough_failures = 50;  // replicas
+constexpr double first_spread = 64;            // [steps]
 constexpr double shortest_spread = 30;         // [steps]
 constexpr std::size_t kept_times = 60;         // steps of which visits are kept
+constexpr double frequent_failures = 0.003;    // a step: rounds that are not split see hundreds of them
 constexpr std::uint64_t pairs_stream = 0xa000;
 
 class Pilot {
@@ -31,9 +33,11 @@ class Pilot {
   }
 
   LevelPilot run() {
-    settle();
+    if (!settle()) return none_left();
     const std::uint64_t window = revolutions(1.5 * pilot_.mixing_steps);
     pilot_.window = window;
+    if (!options_.level && -std::log(ensemble_.survival()) > frequent_failures * static_cast<double>(ensemble_.steps()))
+      return told();
     Levels levels{options_.level ? options_.level : distance_level(frames_, map_.dimension), {}};
     const std::uint64_t failed_before = ensemble_.failures();
     auto steps = std::max(window, revolutions(shortest_spread));
@@ -51,6 +55,7 @@ class Pilot {
       if (now <= bins) steps += revolutions(static_cast<double>(steps) / 2);
       bins = now;
       spread(steps);
+      if (ensemble_.all_failed()) return none_left();
     } while (ensemble_.failures() - failed_before < enough_failures);
     for (int k = 0; k < refinements; ++k) {
       if (!options_.level) {
@@ -65,14 +70,24 @@ class Pilot {
       }
       split(levels);
       spread(std::max(2 * pilot_.window, revolutions(shortest_spread)));
+      if (ensemble_.all_failed()) return none_left();
     }
     split(levels);
     pilot_.levels = std::move(levels);
+    return told();
+  }
+
+ private:
+  LevelPilot none_left() {
+    pilot_.all_fail = true;
+    return told();
+  }
+
+  LevelPilot told() {
     pilot_.calls = calls();
     return std::move(pilot_);
   }
 
- private:
   std::uint64_t calls() const { return ensemble_.calls() + more_calls_; }
 
   std::uint64_t revolutions(double steps) const {
@@ -85,22 +100,24 @@ class Pilot {
     visits_.clear();
     const auto phases = static_cast<std::uint64_t>(map_.phases);
     const std::uint64_t kept = std::max<std::uint64_t>(1, (steps / 2 + kept_times - 1) / kept_times);
-    for (std::uint64_t n = 0; n < steps; ++n) {
+    for (std::uint64_t n = 0; n < steps && !ensemble_.all_failed(); ++n) {
       ensemble_.advance();
       if (options_.told) options_.told();
       if (2 * n + 2 * phases >= steps && n / phases % kept == 0) visits_.add(ensemble_);
     }
   }
 
-  /// Lets the start be forgotten, and finds coordinates and how long memory lasts.
-  void settle() {
-    std::uint64_t steps = revolutions(64);
+  /// Lets the start be forgotten, and finds coordinates and how long memory lasts. Returns whether walks are left.
+  bool settle() {
+    std::uint64_t steps = revolutions(first_spread);
     for (;;) {
+      const bool first = ensemble_.steps() == 0;
       spread(steps);
+      if (ensemble_.all_failed() || (first && ensemble_.survival() < hardly_any)) return false;
       frames_.clear();
       for (const Visits::Phase& phase : visits_.phases) frames_.emplace_back(map_, phase);
       pilot_.mixing_steps = mixing();
-      if (4 * pilot_.mixing_steps <= static_cast<double>(ensemble_.steps())) return;
+      if (4 * pilot_.mixing_steps <= static_cast<double>(ensemble_.steps())) return true;
       if (calls() > options_.most_calls)
         throw std::runtime_error(fmt::format(
             "splitting: the start is not forgotten within {} steps (memory lasts some {:.3g}, by what is seen of "
@@ -145,27 +162,44 @@ class Pilot {
       }
       alive.resize(left), states.resize(left * d);
     }
-    // Squares see memory that is not linear: a state whose sign is drawn anew.
-    Eigen::MatrixXd before(alive.size(), 2 * d), after(alive.size(), 2 * d);
-    std::vector<float> at(d);
-    for (std::size_t i = 0; i < alive.size(); ++i)
-      for (const bool later : {false, true}) {
-        frames_[0].place(later ? std::span<const double>(states).subspan(i * d, d)
-                               : std::span<const double>(first).subspan(alive[i] * d, d),
-                         at);
-        for (std::size_t k = 0; k < d; ++k) {
-          const auto x = static_cast<double>(at[k]);
-          Eigen::MatrixXd& of = later ? after : before;
-          of(static_cast<Eigen::Index>(i), static_cast<Eigen::Index>(k)) = x;
-          of(static_cast<Eigen::Index>(i), static_cast<Eigen::Index>(d + k)) = x * x - 1;
-        }
-      }
     if (alive.size() < 4 * d) return static_cast<double>(map_.phases);
+    std::vector<double> from;
+    for (const std::size_t i : alive) from.insert(from.end(), &first[i * d], &first[i * d] + d);
+    const Eigen::MatrixXd among = placed(from), before = ranks(among, among), after = ranks(placed(states), among);
     const Eigen::MatrixXd gram =
         before.transpose() * before +
         1e-3 * static_cast<double>(alive.size()) * Eigen::MatrixXd::Identity(before.cols(), before.cols());
     const double radius = spectral_radius(solve_columns(gram, before.transpose() * after));
     return map_.phases * std::max(1.0, std::log(left_of_memory) / std::log(std::clamp(radius, 1e-3, 0.9999)));
+  }
+
+  /// Returns the coordinates of states of phase 0, row by row.
+  Eigen::MatrixXd placed(std::span<const double> states) const {
+    const auto d = static_cast<std::size_t>(map_.dimension);
+    Eigen::MatrixXd found(states.size() / d, d);
+    std::vector<float> at(d);
+    for (Eigen::Index i = 0; i < found.rows(); ++i) {
+      frames_[0].place(states.subspan(static_cast<std::size_t>(i) * d, d), at);
+      for (std::size_t k = 0; k < d; ++k) found(i, static_cast<Eigen::Index>(k)) = static_cast<double>(at[k]);
+    }
+    return found;
+  }
+
+  /// Returns what the memory is regressed on: the rank of each coordinate among those of `among`, from -1 to 1, and its
+  /// square, which sees memory that is not linear (a state whose sign is drawn anew), less their means. Of coordinates
+  /// themselves the few walks that are falling, and grow without bound, would make up the regression.
+  static Eigen::MatrixXd ranks(const Eigen::MatrixXd& coordinates, const Eigen::MatrixXd& among) {
+    Eigen::MatrixXd found(coordinates.rows(), 2 * coordinates.cols());
+    for (Eigen::Index k = 0; k < coordinates.cols(); ++k) {
+      std::vector<double> sorted(among.col(k).begin(), among.col(k).end());
+      std::ranges::sort(sorted);
+      for (Eigen::Index i = 0; i < coordinates.rows(); ++i) {
+        const auto below = std::ranges::lower_bound(sorted, coordinates(i, k)) - sorted.begin();
+        const double rank = 2 * static_cast<double>(below) / static_cast<double>(sorted.size()) - 1;
+        found(i, k) = rank, found(i, coordinates.cols() + k) = rank * rank;
+      }
+    }
+    return found.rowwise() - found.colwise().mean();
   }
 
   /// Gives the visits these levels, and the ensemble edges between them.

@@ -7,6 +7,7 @@
 #include <boost/math/distributions/fisher_f.hpp>
 #include <boost/math/distributions/students_t.hpp>
 #include <cmath>
+#include <limits>
 #include <memory>
 #include <stdexcept>
 #include <utility>
@@ -42,6 +43,7 @@ class Study {
 
   SplittingStudy run() {
     learn();
+    if (std::ranges::any_of(pilots_, &LevelPilot::all_fail)) return walk_until_all_fail();
     rounds_.resize(static_cast<std::size_t>(options_.rounds));
     const std::uint64_t revolution = static_cast<std::uint64_t>(map_.phases);
     burn_in_ = whole(std::max({3 * mixing_, 2.0 * static_cast<double>(window_), shortest_burn_in}), revolution);
@@ -55,6 +57,8 @@ class Study {
           mixing_, first_walk));
     for (;;) {
       walk(more);
+      if (std::ranges::any_of(rounds_, [](const Round& round) { return round.ensemble->all_failed(); }))
+        return walk_until_all_fail();
       estimate();
       const double half = 0.5 * std::log(found_.steps.upper / found_.steps.lower);
       if (half <= options_.tolerance && found_.lines >= fewest_lines) break;
@@ -113,21 +117,59 @@ class Study {
       if (!round.ensemble) {
         round.ensemble = std::make_unique<WeightedEnsemble>(map_, start_, options_.replicas, options_.seed, r);
         round.ensemble->set_levels(pilots_[r % pilots_.size()].levels);
-        for (std::uint64_t n = 0; n < burn_in_; ++n) {
+        for (std::uint64_t n = 0; n < burn_in_ && !round.ensemble->all_failed(); ++n) {
           round.early.push_back(round.ensemble->advance());
           ++done, told();
         }
         if (options_.last_steps > 0) round.ensemble->remember(options_.last_steps, walks_of_a_round);
       }
-      for (std::uint64_t n = 0; n < more; ++n) {
+      for (std::uint64_t n = 0; n < more && !round.ensemble->all_failed(); ++n) {
         if (round.shares.size() % window_ == 0) round.ensemble->mark();
         round.shares.push_back(round.ensemble->advance());
         ++done, told();
       }
     });
-    std::uint64_t called = found_.pilot_calls;
-    for (const Round& round : rounds_) called += round.ensemble->calls();
-    calls_ = called;
+    count_calls();
+  }
+
+  void count_calls() {
+    calls_ = found_.pilot_calls + lost_calls_;
+    for (const Round& round : rounds_) calls_ += round.ensemble->calls();
+  }
+
+  /// Starts rounds anew that are not split, and follows each until hardly_any walk is left.
+  SplittingStudy walk_until_all_fail() {
+    lost_calls_ = calls_ - found_.pilot_calls;
+    rounds_.clear();
+    rounds_.resize(static_cast<std::size_t>(options_.rounds));
+    const auto told = one_at_a_time([this] { tell(0); });
+    const std::uint64_t most = (options_.most_calls - calls_) / rounds_.size();
+    parallel_for(rounds_.size(), options_.threads, [&](std::size_t r) {
+      Round& round = rounds_[r];
+      round.ensemble = std::make_unique<WeightedEnsemble>(map_, start_, options_.replicas, options_.seed, r);
+      for (int mark = 0; mark < 2; ++mark) round.ensemble->mark();
+      if (options_.last_steps > 0) round.ensemble->remember(options_.last_steps, walks_of_a_round);
+      while (round.ensemble->survival() > hardly_any) {
+        if (round.ensemble->calls() > most)
+          throw std::runtime_error(fmt::format(
+              "splitting: all {} replicas of a pilot fail in one step, and those of another ensemble walk on "
+              "after {} steps: no number is given",
+              options_.replicas, round.ensemble->steps()));
+        round.early.push_back(round.ensemble->advance());
+        told();
+      }
+    });
+    found_.all_failed = true;
+    burn_in_ = 0;
+    for (const Round& round : rounds_) burn_in_ = std::max<std::uint64_t>(burn_in_, round.early.size());
+    for (Round& round : rounds_) round.early.resize(burn_in_, 1.0);
+    mixing_ = std::numeric_limits<double>::quiet_NaN();
+    count_calls();
+    estimate();
+    judge();
+    if (options_.last_steps > 0)
+      for (const Round& round : rounds_) found_.failing.add(round.ensemble->failing());
+    return std::move(found_);
   }
 
   /// Returns the mean share that fails at each phase, of one round, over [first, last) of its steps.
@@ -162,9 +204,10 @@ class Study {
       failed += now * one;
       now *= 1 - one;
     }
+    if (survival) survival->assign(alive.begin() + 1, alive.end());
+    if (found_.all_failed) return {all.steps, std::numeric_limits<double>::quiet_NaN()};
     all.steps += alive[burn_in_] * walked / failed;
     all.rate = phases == 1 ? share[0] : -std::expm1(std::log1p(-failed) / static_cast<double>(phases));
-    if (survival) survival->assign(alive.begin() + 1, alive.end());
     return all;
   }
 
@@ -192,6 +235,7 @@ class Study {
       const Pooled others = pooled(r);
       steps.push_back(others.steps);
       rates.push_back(others.rate);
+      if (found_.all_failed) continue;
       double mean = 0;
       for (const double one : rounds_[r].shares) mean += one;
       found_.rates.push_back(mean / static_cast<double>(rounds_[r].shares.size()));
@@ -261,7 +305,7 @@ class Study {
   /// Returns the level at which rates differ between the pilots' levels by more than between rounds of one.
   double pilots_disagree() const {
     const std::size_t groups = pilots_.size(), each = rounds_.size() / groups;
-    if (groups < 2 || each < 2) return 1;
+    if (groups < 2 || each < 2 || found_.all_failed) return 1;
     double grand = 0, between = 0, within = 0;
     for (const double rate : found_.rates) grand += rate / static_cast<double>(rounds_.size());
     for (std::size_t g = 0; g < groups; ++g) {
@@ -281,7 +325,7 @@ class Study {
   std::vector<LevelPilot> pilots_;
   std::vector<Round> rounds_;
   double mixing_ = 0;
-  std::uint64_t window_ = 1, burn_in_ = 0, calls_ = 0;
+  std::uint64_t window_ = 1, burn_in_ = 0, calls_ = 0, lost_calls_ = 0;
   SplittingStudy found_;
 };
 

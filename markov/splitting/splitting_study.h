@@ -33,6 +33,10 @@ struct SplittingStudy {
   MeshEstimate failure_rate;     ///< a step, from the quasi-stationary distribution
   double mixing_steps = 0;       ///< e-folding of what is remembered of a state, by linear regression
   std::vector<double> survival;  ///< [k]: share that walks on after k + 1 steps; beyond the last at the failure rate
+  /// Walks fail before the start is forgotten (less than 1e-6 of them is left). Then steps are counted, nothing is
+  /// split, and there are no survivors to speak of: the failure rate and the mixing steps are NaN, and `rates` is
+  /// empty.
+  bool all_failed = false;
   int rounds = 0;
   std::uint64_t round_steps = 0;  ///< that each took
   std::uint64_t calls = 0;        ///< rows that the map was asked for, those of the pilots included
@@ -53,7 +57,8 @@ MeshEstimate steps_from_quasi_stationary(const SplittingStudy& study);
 /// starts at `start`, is followed through a burn-in of three mixing times or two windows, which tells how survival
 /// begins, and then until the failure rates of all give an interval as narrow as asked, or most_calls is reached.
 /// Expected steps are the survival's sum through the burn-in, and the rate beyond. The intervals are Student's, of the
-/// logarithm, over the jackknife's values of the rounds.
+/// logarithm, over the jackknife's values of the rounds. Where all replicas of one ensemble fail, the rounds start
+/// anew, without levels, and walk until all of theirs have failed.
 ///
 /// No number is given where fewer than 30 independent lines lead to failure (a line is founded one to two windows
 /// before; a window is 1.5 mixing times, and as many steps as a failure takes), where the interval is wider than a

@@ -104,8 +104,9 @@ double WeightedEnsemble::advance() {
     older_line_[left] = older_line_[i];
     std::copy_n(&next_[i * d], d, &states_[left++ * d]);
   }
-  if (left == 0) throw MapError(fmt::format("splitting: all {} replicas fail in step {}", failed_.size(), steps_));
   states_.resize(left * d), weights_.resize(left), line_.resize(left), older_line_.resize(left);
+  survival_ *= kept / (lost + kept);
+  if (left == 0) return 1;
   const double share = lost / (lost + kept);
   for (double& weight : weights_) weight /= kept;
   place();

@@ -40,9 +40,11 @@ class WeightedEnsemble {
 
   /// Splits by other levels from the next step on.
   void set_levels(Levels levels);
-  /// Takes one step and returns the share of the weight that fails in it.
-  /// @throws MapError where all replicas fail; where a level is not finite; as checked_step
+  /// Takes one step and returns the share of the weight that fails in it: 1 where all replicas fail, which is the last.
+  /// @pre  not all_failed()  @throws MapError where a level is not finite; as checked_step
   double advance();
+  bool all_failed() const { return size() == 0; }
+  double survival() const { return survival_; }  ///< share of the weight that has not failed in any step
   /// Lets every replica found a line of descent; failures are counted for the lines founded two marks ago.
   void mark();
 
@@ -73,6 +75,7 @@ class WeightedEnsemble {
   std::uint64_t seed_, stream_;
   Levels split_;
   int phase_ = 0, marks_ = 0;
+  double survival_ = 1;
   std::uint64_t steps_ = 0, calls_ = 0, failures_ = 0;
   std::vector<double> states_, weights_, levels_;
   std::vector<int> bins_;

@@ -15,23 +15,24 @@ namespace {
 using Json = nlohmann::ordered_json;
 using Lines = std::vector<std::pair<std::string, std::string>>;
 
+Json interval_json(const markov::MeshEstimate& e) { return {{"value", e.value}, {"interval_95", {e.lower, e.upper}}}; }
+
 Json study_json(const markov::SplittingStudy& s) {
-  const markov::MeshEstimate regime = markov::steps_from_quasi_stationary(s);
   Json survival = {1.0};
   for (const double share : s.survival) survival.push_back(share);
-  return {{"expected_steps",
-           {{"value", s.steps.value},
-            {"interval_95", {s.steps.lower, s.steps.upper}},
-            {"from_quasi_stationary", regime.value},
-            {"from_quasi_stationary_interval_95", {regime.lower, regime.upper}}}},
-          {"failure_rate_per_step",
-           {{"value", s.failure_rate.value}, {"interval_95", {s.failure_rate.lower, s.failure_rate.upper}}}},
-          {"survival", survival},
-          {"mixing_steps", s.mixing_steps},
-          {"rounds", s.rounds},
-          {"steps_of_a_round", s.round_steps},
-          {"rates_of_rounds", s.rates},
-          {"lines_to_failure", s.lines},
+  Json steps = interval_json(s.steps), rate, mixing;
+  steps["from_quasi_stationary"] = steps["from_quasi_stationary_interval_95"] = nullptr;
+  if (!s.all_failed) {
+    const markov::MeshEstimate regime = markov::steps_from_quasi_stationary(s);
+    steps["from_quasi_stationary"] = regime.value;
+    steps["from_quasi_stationary_interval_95"] = {regime.lower, regime.upper};
+    rate = interval_json(s.failure_rate);
+    mixing = s.mixing_steps;
+  }
+  return {{"expected_steps", steps},    {"failure_rate_per_step", rate},
+          {"survival", survival},       {"mixing_steps", mixing},
+          {"rounds", s.rounds},         {"steps_of_a_round", s.round_steps},
+          {"rates_of_rounds", s.rates}, {"lines_to_failure", s.lines},
           {"steps_of_the_map", s.calls}};
 }
 
@@ -42,14 +43,24 @@ Lines effort_lines(const markov::SplittingStudy& s) {
                                            static_cast<double>(s.calls), static_cast<double>(s.pilot_calls))}};
 }
 
+Lines steps_lines(const markov::SplittingStudy& s) {
+  Lines lines{{"expected steps before failure", estimate_text(s.steps)}};
+  if (!s.all_failed)
+    lines.emplace_back("  from the metastable regime", estimate_text(markov::steps_from_quasi_stationary(s)));
+  return lines;
+}
+
 Lines lines_of(const SplittingAnswer& answer) {
   const markov::SplittingStudy& s = answer.passage;
-  Lines lines{{"expected steps before failure", estimate_text(s.steps)},
-              {"  from the metastable regime", estimate_text(markov::steps_from_quasi_stationary(s))},
-              {"status", "by splitting: the rounds agree"}};
+  Lines lines = steps_lines(s);
+  lines.emplace_back("status", s.all_failed
+                                   ? "all walks were followed to failure: they fail before the start is forgotten"
+                                   : "by splitting: the rounds agree");
   if (!answer.no_mesh.empty()) lines.emplace_back("no mesh", answer.no_mesh);
-  lines.emplace_back("failure rate per step", estimate_text(s.failure_rate));
-  lines.emplace_back("mixing", fmt::format("{:.3g} steps", s.mixing_steps));
+  if (!s.all_failed) {
+    lines.emplace_back("failure rate per step", estimate_text(s.failure_rate));
+    lines.emplace_back("mixing", fmt::format("{:.3g} steps", s.mixing_steps));
+  }
   for (auto& line : effort_lines(s)) lines.push_back(std::move(line));
   return lines;
 }
@@ -64,7 +75,9 @@ std::string joined(const Lines& lines) {
 
 std::string splitting_json(const SplittingAnswer& answer, const std::optional<analysis::LastMoments>& moments,
                            const Provenance& provenance) {
-  Json json = {{"setting", answer.name}, {"method", "splitting"}, {"status", "rounds_agree"}};
+  Json json = {{"setting", answer.name},
+               {"method", "splitting"},
+               {"status", answer.passage.all_failed ? "all_failed" : "rounds_agree"}};
   json["no_mesh"] = answer.no_mesh.empty() ? Json(nullptr) : Json(answer.no_mesh);
   json.update(study_json(answer.passage));
   if (moments) json["how_it_fails"] = Json::parse(last_moments_json(*moments));
@@ -94,8 +107,7 @@ std::string with_splitting_json(const std::string& mesh_json, const markov::Spli
 }
 
 std::string with_splitting_text(const std::string& mesh_text, const markov::SplittingStudy& study) {
-  Lines lines{{"expected steps before failure", estimate_text(study.steps)},
-              {"  from the metastable regime", estimate_text(markov::steps_from_quasi_stationary(study))}};
+  Lines lines = steps_lines(study);
   for (auto& line : effort_lines(study)) lines.push_back(std::move(line));
   return mesh_text + "\nBeside it, by splitting (agreed: within the joint interval)\n" + joined(lines);
 }

@@ -8,6 +8,7 @@
 #include <string>
 #include <vector>
 
+#include "markov/mesh/batch_simulation.h"
 #include "tests/markov/mesh/maps.h"
 #include "tests/markov/splitting/ladder.h"
 
@@ -71,6 +72,44 @@ TEST(SplittingStudy, TakesEightDimensions) {
   start[0] = 1.5;
   expect_near(splitting_study(eight_batch(0.6), start, quick), linear_steps(0.6, 2));
   EXPECT_THROW(mesh_study(eight_batch(0.6), start), TooManyDimensions);
+}
+
+/// Two numbers shrink by 0.3; beyond 3 they grow threefold, with no way back, until one is beyond 100.
+BatchMap running_away() {
+  BatchMap map;
+  map.dimension = map.scores = 2;
+  map.step = [](int, auto states, auto scores, auto next, auto failed) {
+    for (std::size_t i = 0; i < failed.size(); ++i) {
+      for (std::size_t k = 2 * i; k < 2 * i + 2; ++k) {
+        next[k] = std::abs(states[k]) > 3 ? 3 * states[k] : 0.3 * states[k] + scores[k];
+        if (std::abs(next[k]) > 100) failed[i] = 1;
+      }
+    }
+  };
+  return map;
+}
+
+TEST(SplittingStudy, FallingWalksDoNotPassForMemory) {
+  const std::vector<double> start{0, 0};
+  const SplittingStudy study = splitting_study(running_away(), start, quick);
+  EXPECT_LT(study.mixing_steps, 3);  // 0.8, were there no failures
+  expect_near(study, simulate_steps(running_away(), start, {.trials = 4000, .threads = 1})->mean);
+}
+
+TEST(SplittingStudy, CountsStepsWhereWalksFailBeforeTheStartIsForgotten) {
+  BatchMap map;
+  map.dimension = map.scores = 1;
+  map.step = [](int, auto states, auto scores, auto next, auto failed) {
+    for (std::size_t i = 0; i < failed.size(); ++i) next[i] = states[i] - 1 + 0.5 * scores[i], failed[i] = next[i] < 0;
+  };
+  const std::vector<double> start{3};
+  const SplittingStudy study = splitting_study(map, start, quick);
+  EXPECT_TRUE(study.all_failed);
+  EXPECT_EQ(study.disagreement, "");
+  EXPECT_TRUE(std::isnan(study.failure_rate.value) && study.rates.empty());
+  EXPECT_LT(study.survival.back(), 1e-6);
+  const SimulatedSteps simulated = *simulate_steps(map, start, {.trials = 100000, .threads = 1});
+  EXPECT_NEAR(study.steps.value, simulated.mean, 4 * simulated.standard_error + study.steps.upper - study.steps.lower);
 }
 
 TEST(SplittingStudy, IsTheSameOnAnyNumberOfThreads) {

@@ -75,7 +75,9 @@ TEST(WeightedEnsemble, SaysThatEverythingFails) {
   BatchMap map;
   map.step = [](int, auto, auto, auto, auto failed) { std::fill(failed.begin(), failed.end(), 1); };
   WeightedEnsemble ensemble(map, std::vector{0.0}, 100, 1, 0);
-  EXPECT_THROW(ensemble.advance(), MapError);
+  EXPECT_EQ(ensemble.advance(), 1);
+  EXPECT_TRUE(ensemble.all_failed());
+  EXPECT_EQ(ensemble.survival(), 0);
 }
 
 }  // namespace
