@@ -581,7 +581,7 @@ std::string disagreement(const char* one, const MeshEstimate& a, const char* oth
 }
 
 void require_agreement(const MeshStudy& study, const std::string& what) {
-  if (!study.disagreement.empty()) throw Disagreement(fmt::format("{}: {}", what, study.disagreement));
+  if (!study.disagreement.empty()) throw RefutedMesh(fmt::format("{}: {}", what, study.disagreement));
 }
 
 }  // namespace metastable::markov

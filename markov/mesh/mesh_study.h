@@ -90,6 +90,12 @@ class Disagreement : public std::runtime_error {
   using std::runtime_error::runtime_error;
 };
 
+/// Says that other ways contradict a mesh, or that it does not converge: a way without a mesh may have a number.
+class RefutedMesh : public Disagreement {
+ public:
+  using Disagreement::Disagreement;
+};
+
 /// Meshes lie around the start's noise-free orbit. An unstable one leads without noise to another gait, which may come
 /// back after several revolutions (periodic_gait): meshes lie around that one then, and steps are counted from the
 /// start all the same. An orbit of several revolutions is held by one mesh with a common frame, on which the noise
@@ -129,7 +135,7 @@ MeshStudy mesh_study(const BatchMap& map, std::span<const double> start, const M
 std::string disagreement(const char* one, const MeshEstimate& a, const char* other, const MeshEstimate& b);
 
 /// @param what  was studied, for the message
-/// @throws Disagreement with MeshStudy::disagreement, unless that is empty
+/// @throws RefutedMesh with MeshStudy::disagreement, unless that is empty
 void require_agreement(const MeshStudy& study, const std::string& what);
 
 }  // namespace metastable::markov

@@ -47,9 +47,18 @@ std::optional<SplittingAnswer> ask_both_ways(WalkerMethod method, const std::str
                                              const std::function<markov::SplittingStudy()>& split) {
   SplittingAnswer answer{name, {}, {}};
   const markov::MeshStudy* found = nullptr;
-  if (method == WalkerMethod::mesh) mesh();
+  if (method == WalkerMethod::mesh) try {
+      mesh();
+    } catch (const markov::RefutedMesh& error) {
+      throw markov::RefutedMesh(std::string(error.what()) + " (the method splitting needs no mesh)");
+    }
   if (method == WalkerMethod::both) try {
       found = mesh();
+    } catch (const markov::RefutedMesh& error) {
+      answer.no_mesh = error.what();
+      if (answer.no_mesh.starts_with(name + ": ")) answer.no_mesh.erase(0, name.size() + 2);
+      if (const std::string end = ": no number is given"; answer.no_mesh.ends_with(end))
+        answer.no_mesh.resize(answer.no_mesh.size() - end.size());
     } catch (const markov::MapError& error) {
       answer.no_mesh = error.what();
     } catch (const markov::TooManyDimensions& error) {

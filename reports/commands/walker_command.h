@@ -49,8 +49,8 @@ struct WalkerAnswer {
   std::optional<analysis::LastMoments> moments;
 };
 /// Finds a mesh's answer, that of splitting, or both, held against each other.
-/// @param mesh  finds the mesh's answer; under `both`, what it throws for want of a mesh becomes
-/// SplittingAnswer::no_mesh
+/// @param mesh  finds the mesh's answer; under `both`, what it throws for want of a mesh, or because other ways refute
+///        it, becomes SplittingAnswer::no_mesh
 /// @param split  finds the answer of splitting with a listener
 /// @returns the answer of splitting where it was asked
 /// @throws as these; markov::Disagreement where the two contradict each other

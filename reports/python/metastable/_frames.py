@@ -92,11 +92,11 @@ def plot_steps(ax, names, value, low, high):
 
 
 def plot_survival(ax, survival, rate):
-    """P(steps > n): as far as it is known step by step, and beyond at the failure rate of the metastable regime."""
+    """P(steps > n): as far as it is known step by step, and beyond at the failure rate of the metastable regime, if any."""
     ax = axes(ax)
     last = len(survival) - 1
     ax.step(numpy.arange(last + 1), survival, where="post", label="survival")
-    if 0 < rate < 1 and survival[-1] > 0.05:
+    if rate is not None and 0 < rate < 1 and survival[-1] > 0.05:
         n = numpy.linspace(last, last + numpy.log(0.05 / survival[-1]) / numpy.log1p(-rate), 200)
         ax.plot(n, survival[-1] * numpy.exp((n - last) * numpy.log1p(-rate)), "--", label="at the failure rate per step")
         ax.legend()

@@ -286,7 +286,8 @@ class WalkerStudy(Result):
         return {"steps": numpy.arange(len(self.survival)), "survival": self.survival}
 
     def _draw(self, ax):
-        return _frames.plot_survival(ax, self.survival, self.failure_rate_per_step.value)
+        # Walks that all fail at once have no rate (`status` "all_failed").
+        return _frames.plot_survival(ax, self.survival, self.failure_rate_per_step and self.failure_rate_per_step.value)
 
 
 class WalkerComparison(Result):

@@ -59,6 +59,24 @@ TEST_F(WalkerCommand, SplittingAgreesWithTheMesh) {
   EXPECT_EQ(beside["status"], "agreed");
 }
 
+TEST_F(WalkerCommand, SplittingStandsAloneWhereTheMeshIsRefuted) {
+  std::vector<std::string> steep{"steps",      "--walker", "compass",           "--slope", "30",
+                                 "--slope-sd", "0.5",      "--simulated-steps", "20000"};
+  const Ran mesh = metastable(steep);
+  EXPECT_EQ(mesh.code, 3);
+  EXPECT_NE(mesh.err.find("no number is given (the method splitting needs no mesh)"), std::string::npos) << mesh.err;
+  steep.insert(steep.end(), {"--method", "auto", "--how-it-fails", "--json", path("steep.json")});
+  const Ran both = metastable(steep);
+  ASSERT_EQ(both.code, 0) << both.err;
+  EXPECT_NE(both.out.find("How it fails is not told: walks fail before the start is forgotten"), std::string::npos)
+      << both.out;
+  const auto json = nlohmann::json::parse(read(path("steep.json")));
+  EXPECT_EQ(json["status"], "all_failed");
+  EXPECT_TRUE(json["no_mesh"].get<std::string>().starts_with("the mesh")) << json["no_mesh"];
+  EXPECT_NEAR(json["expected_steps"]["value"].get<double>(), 2.073, 0.02);  // 20000 walks simulated
+  EXPECT_TRUE(json["failure_rate_per_step"].is_null() && json["mixing_steps"].is_null());
+}
+
 TEST_F(WalkerCommand, SimulateWritesEveryStep) {
   const Ran ran = metastable(walker("simulate", {"--trials", "5", "--out", path("walks")}));
   ASSERT_EQ(ran.code, 0) << ran.err;
