@@ -1,7 +1,11 @@
-"""The notebooks of the site are run, and say what they hold. METASTABLE_WRITE_PAGES=1 writes what comes out instead."""
+"""The notebooks of the site are run, and say what they hold. METASTABLE_WRITE_PAGES=1 writes what comes out instead.
+
+Cells tagged "slow" take a minute and more: they are run only to be written.
+"""
 
 import ast
 import contextlib
+import importlib.util
 import io
 import json
 import os
@@ -53,6 +57,8 @@ class Notebooks(unittest.TestCase):
                     if cell["cell_type"] != "code":
                         continue
                     count += 1
+                    if "slow" in cell["metadata"].get("tags", []) and not os.environ.get("METASTABLE_WRITE_PAGES"):
+                        continue
                     made = outputs(*ran("".join(cell["source"]), names), count)
                     if os.environ.get("METASTABLE_WRITE_PAGES"):
                         cell["outputs"], cell["execution_count"] = made, count
@@ -67,6 +73,10 @@ class Notebooks(unittest.TestCase):
 
     def test_walks(self):
         self.check("walks.ipynb")
+
+    @unittest.skipUnless(importlib.util.find_spec("dartpy"), "the biped in DART needs python3-dartpy")
+    def test_dart_biped(self):
+        self.check("dart-biped.ipynb")
 
 
 if __name__ == "__main__":
