@@ -5,6 +5,7 @@
 #include <Eigen/Core>
 #include <algorithm>
 #include <cmath>
+#include <numeric>
 #include <stdexcept>
 #include <utility>
 #include <vector>
@@ -138,10 +139,11 @@ class Pilot {
       states.insert(states.end(), &visits.states[from * d], &visits.states[from * d] + d);
     }
     const std::vector<double> first = states;
-    std::vector<std::uint8_t> failed(n), gone(n, 0);
+    std::vector<std::uint8_t> failed(n);
     std::vector<std::uint64_t> words(n);
     std::vector<std::size_t> alive(n);
-    for (std::size_t i = 0; i < n; ++i) alive[i] = i;
+    std::iota(alive.begin(), alive.end(), std::size_t{0});
+    Eigen::VectorXd weights = Eigen::VectorXd::Ones(static_cast<Eigen::Index>(n));
     for (int phase = 0; phase < map_.phases && !alive.empty(); ++phase) {
       const std::size_t m = alive.size();
       const std::uint64_t stream = pairs_stream + (options_.stream << 16);
@@ -156,6 +158,7 @@ class Pilot {
       more_calls_ += m;
       std::size_t left = 0;
       for (std::size_t i = 0; i < m; ++i) {
+        if (s > 0) weights[static_cast<Eigen::Index>(alive[i])] *= weight[i];
         if (failed[i]) continue;
         alive[left] = alive[i];
         std::copy_n(&next[i * d], d, &states[left++ * d]);
@@ -163,13 +166,15 @@ class Pilot {
       alive.resize(left), states.resize(left * d);
     }
     if (alive.size() < 4 * d) return static_cast<double>(map_.phases);
-    std::vector<double> from;
-    for (const std::size_t i : alive) from.insert(from.end(), &first[i * d], &first[i * d] + d);
-    const Eigen::MatrixXd among = placed(from), before = ranks(among, among), after = ranks(placed(states), among);
+    const Eigen::MatrixXd among = placed(first), before = ranks(among, among), landed = ranks(placed(states), among);
+    Eigen::MatrixXd after =
+        Eigen::MatrixXd::Zero(before.rows(), before.cols());  // what fails is recycled, and forgotten
+    for (std::size_t i = 0; i < alive.size(); ++i)
+      after.row(static_cast<Eigen::Index>(alive[i])) = landed.row(static_cast<Eigen::Index>(i));
+    const Eigen::MatrixXd weighted = before.transpose() * weights.asDiagonal();
     const Eigen::MatrixXd gram =
-        before.transpose() * before +
-        1e-3 * static_cast<double>(alive.size()) * Eigen::MatrixXd::Identity(before.cols(), before.cols());
-    const double radius = spectral_radius(solve_columns(gram, before.transpose() * after));
+        weighted * before + 1e-3 * static_cast<double>(n) * Eigen::MatrixXd::Identity(before.cols(), before.cols());
+    const double radius = spectral_radius(solve_columns(gram, weighted * after));
     return map_.phases * std::max(1.0, std::log(left_of_memory) / std::log(std::clamp(radius, 1e-3, 0.9999)));
   }
 

@@ -91,20 +91,24 @@ class Counted:
 def walkers(settings):
     """Built-in walkers: what an interval takes, against direct simulation for as narrow a one, whose seconds a step are
     measured on some walks and scaled. Steps before failure scatter by as much as their mean."""
-    for name, slope, sd in settings:
+    for name, slope, sd, method in settings:
         setting = metastable.WalkerSetting(name, sd, slope)
-        study, seconds = cpu(lambda: metastable.study(setting, threads=1, progress=False))
+        study, seconds = cpu(lambda: metastable.study(setting, method=method, threads=1, progress=False))
         mean, (low, high) = study.expected_steps.value, study.expected_steps.interval_95
-        counted = Counted(setting)
-        metastable.study(metastable.walker(counted, len(study.gait.state), 1, start=study.gait.state), threads=1,
-                         progress=False)
+        if method == "splitting":
+            calls = study.steps_of_the_map
+        else:
+            counted = Counted(setting)
+            metastable.study(metastable.walker(counted, len(study.gait.state), 1, start=study.gait.state), threads=1,
+                             progress=False)
+            calls = counted.calls
         needed = (1.96 * 2 * mean / (high - low)) ** 2 * mean
         walks, walking = cpu(lambda: metastable.simulate(setting, trials=max(20, round(20000 / min(mean, 1000))), threads=1,
                                                          progress=False))
         direct = walking / sum(walks.steps) * needed
         yield line(f"steps of {name}, slope sd {sd:g} deg: {mean:.3g} within {50 * (high - low) / mean:.2g} %",
-                   f"{seconds:.1f} s, {counted.calls:.1e} steps", f"{direct:.1e} s, {needed:.1e} steps, direct simulation",
-                   f"{rounded(direct / seconds)} ({rounded(needed / counted.calls)} of steps)", "walkers")
+                   f"{seconds:.1f} s, {calls:.1e} steps, {method}", f"{direct:.1e} s, {needed:.1e} steps, direct simulation",
+                   f"{rounded(direct / seconds)} ({rounded(needed / calls)} of steps)", "walkers")
 
 
 def swing(state, noise, p):
@@ -191,7 +195,9 @@ def main():
         "chains": lambda: itertools.chain(
             own_chains((4000, True), {"random, kill 1e-12": ["first passage", "quasi-stationary"]}),
             own_chains((100000, False), {"random, kill 1e-06": everywhere}), deeptime()),
-        "walkers": lambda: walkers([("simplest", 0.5156620156, 0.0458), ("simplest", 0.5156620156, 0.0225)]),
+        "walkers": lambda: walkers([("simplest", 0.5156620156, 0.0458, "mesh"), ("simplest", 0.5156620156, 0.0225, "mesh"),
+                                    ("simplest", 0.5156620156, 0.0225, "splitting"), ("compass", 3, 0.458, "mesh"),
+                                    ("compass", 3, 0.2108, "splitting"), ("biped", 1, 0.68, "splitting")]),
         "diagnosis": lambda: diagnosis(5)}
     for part in given.only:
         for row in parts[part]():
