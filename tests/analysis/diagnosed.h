@@ -5,6 +5,7 @@
 #include <string>
 #include <vector>
 
+#include "analysis/diagnosis/diagnosis.h"
 #include "analysis/experiment/experiment.h"
 #include "analysis/fitting/transition_model.h"
 #include "analysis/wheel_model/wheel_transitions.h"
@@ -43,6 +44,11 @@ inline EffectTerm term(const TransitionModel& model, const std::string& id, std:
   for (const Candidate& candidate : model.candidates())
     if (candidate.id == id) return {&candidate, std::move(variant), std::move(values)};
   throw std::invalid_argument("no candidate " + id);
+}
+
+/// Returns the verdict and the causes alone: the rest of diagnose() takes as long again.
+inline Diagnosis decided(const TransitionModel& model, const DiagnosisOptions& options) {
+  return decide_each(model, options, {options.rules}).front();
 }
 
 }  // namespace metastable::analysis::test

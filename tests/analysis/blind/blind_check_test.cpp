@@ -11,6 +11,7 @@
 #include "analysis/diagnosis/diagnosis.h"
 #include "analysis/experiment_model/experiment_model.h"
 #include "markov/parallel.h"
+#include "tests/analysis/diagnosed.h"
 
 namespace metastable::analysis {
 namespace {
@@ -38,7 +39,7 @@ std::vector<Outcome> check(const std::vector<BlindPlan>& plans, std::uint64_t se
     options.threads = 1;
     options.draws = 1000;
     options.catalogue = one.catalogue;
-    outcomes[i] = {one.truth, diagnose(*transition_model(experiment), options)};
+    outcomes[i] = {one.truth, test::decided(*transition_model(experiment), options)};
   });
   return outcomes;
 }

@@ -10,6 +10,7 @@
 #include "analysis/diagnosis/diagnosis.h"
 #include "analysis/drum_model/coast_down_transitions.h"
 #include "analysis/experiment/coast_down.h"
+#include "tests/analysis/diagnosed.h"
 
 namespace metastable::analysis {
 namespace {
@@ -46,9 +47,9 @@ Diagnosis diagnosed(const CoastDownRun& nominal, bool linear, const std::vector<
   const ExperimentFiles files = coast_down_files(runs, fit_loss({nominal}, linear).loss, std::nullopt, "drum", {});
   DiagnosisOptions options;
   options.draws = 500;
-  return diagnose(*coast_down_transitions(parse_experiment(
-                      {"folder", files.experiment_toml, files.collisions_csv, std::nullopt, std::nullopt})),
-                  options);
+  return test::decided(*coast_down_transitions(parse_experiment(
+                           {"folder", files.experiment_toml, files.collisions_csv, std::nullopt, std::nullopt})),
+                       options);
 }
 
 // A tyre pressed on the drum is a constant torque fifteen times the nominal constant loss, and a little more that grows

@@ -4,7 +4,8 @@
 #include <algorithm>
 
 #include "analysis/diagnosis/diagnosis.h"
-#include "analysis/experiment_model/diagnose.h"
+#include "analysis/experiment_model/experiment_model.h"
+#include "tests/analysis/diagnosed.h"
 #include "tests/analysis/experiment_model/engine_wheel.h"
 
 namespace metastable::analysis {
@@ -22,23 +23,26 @@ DiagnosisOptions some_effects() {
   return options;
 }
 
+Diagnosis decided(const metastable::test::EngineRun& run, const DiagnosisOptions& options) {
+  return test::decided(*transition_model(metastable::test::engine_experiment(run)), options);
+}
+
 TEST(EngineDiagnosis, ARigidBodyIsNoGapOrARecalibrationOfAFewPerCent) {
-  const Diagnosis d = diagnose(test::engine_experiment({.seed = 11}));
+  const Diagnosis d = decided({.seed = 11}, {});
   EXPECT_TRUE(d.verdict == Verdict::no_gap || d.verdict == Verdict::recalibrate) << verdict_name(d.verdict);
   EXPECT_NEAR(parameter(d.gap.contact, "restitution_mean").value, 0.4, 0.015);
   EXPECT_NEAR(parameter(d.gap.contact, "friction_mean").value, 0.4, 0.01);
 }
 
 TEST(EngineDiagnosis, AnOddLegIsNamedWithItsFriction) {
-  const Diagnosis d =
-      diagnose(test::engine_experiment({.seed = 12, .odd_leg = 5, .friction_ratio = 0.88}), some_effects());
+  const Diagnosis d = decided({.seed = 12, .odd_leg = 5, .friction_ratio = 0.88}, some_effects());
   ASSERT_EQ(d.causes.set, std::vector<std::string>{"leg_contact"});
   EXPECT_NEAR(parameter(d.causes.ranked.front().parameters.front(), "friction_ratio").value, 0.88, 0.03);
   EXPECT_EQ(parameter(d.causes.ranked.front().parameters.front(), "leg").value, 5);
 }
 
 TEST(EngineDiagnosis, ADragAtTheAxleIsInTheSetWithItsSize) {
-  const Diagnosis d = diagnose(test::engine_experiment({.seed = 13, .viscous_drag = 0.004}), some_effects());
+  const Diagnosis d = decided({.seed = 13, .viscous_drag = 0.004}, some_effects());
   ASSERT_EQ(d.verdict, Verdict::explained);
   EXPECT_LE(d.causes.set.size(), 3u);
   const auto drag = std::ranges::find(d.causes.ranked, "axle_drag_viscous", &Cause::name);

@@ -49,7 +49,6 @@ class World {
     const double slope = on.slope_deg * degree;
     dWorldSetGravity(world_, gravity * std::sin(slope), -gravity * std::cos(slope), 0);
     dWorldSetCFM(world_, 1e-10);
-    dWorldSetQuickStepNumIterations(world_, 60);
     dWorldSetQuickStepW(world_, 1);
     body_ = dBodyCreate(world_);
     dMass all;
@@ -93,6 +92,7 @@ class World {
       }
       const double omega = -dBodyGetAngularVel(body_)[2];
       dBodyAddTorque(body_, 0, 0, run_.viscous_drag * omega);
+      dWorldSetQuickStepNumIterations(world_, touching_ ? 20 : 2);  // in flight nothing is coupled
       dWorldQuickStep(world_, step);
       dJointGroupEmpty(contacts_);
       const dReal* v = dBodyGetLinearVel(body_);
@@ -116,12 +116,14 @@ class World {
   void touch(double time, std::vector<Row>& rows) {
     const dReal *at = dBodyGetPosition(body_), *turned = dBodyGetRotation(body_);
     const double omega = -dBodyGetAngularVel(body_)[2];
+    touching_ = false;
     for (int leg = 0; leg < legs; ++leg) {
       const auto k = static_cast<std::size_t>(leg);
       const double x = at[0] + turned[0] * tip_x_[k] + turned[1] * tip_y_[k],
                    y = at[1] + turned[4] * tip_x_[k] + turned[5] * tip_y_[k], depth = tip_radius - y;
       if (open_ && leg == rows.back().leg && depth < 0) close(rows, omega);
       if (depth < 0) continue;
+      touching_ = true;
       if (leg == next_) {
         if (open_) close(rows, omega);
         rows.push_back({leg, time, x, omega, omega});
@@ -155,6 +157,7 @@ class World {
   dBodyID body_ = nullptr;
   std::array<double, legs> tip_x_{}, tip_y_{}, restitution_{}, friction_{};
   int next_ = 1;
+  bool touching_ = false;
   bool open_ = false;  // the foot that landed last has not left the ground again
 };
 

@@ -10,7 +10,7 @@ namespace metastable::test {
 /// Says what is run. The wheel is the paper's with J = 0.0025 kg m^2 and tips of 0.5 mm, restitution 0.40 +- 0.05 and
 /// friction 0.40 +- 0.03 by foothold, on ramps of 9.59 deg (fast and slow) and 7.02 deg.
 struct EngineRun {
-  int trials = 20;  ///< of each of three conditions
+  int trials = 12;  ///< of each of three conditions
   std::uint64_t seed = 1;
   double viscous_drag = 0;  ///< at the axle [N m s]
   int odd_leg = -1;         ///< whose friction is multiplied by friction_ratio; -1: none

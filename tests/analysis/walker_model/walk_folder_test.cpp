@@ -10,7 +10,9 @@
 #include <string>
 
 #include "analysis/experiment/input_error.h"
+#include "analysis/machine_model/machine_transitions.h"
 #include "analysis/walker_model/walker_experiment.h"
+#include "tests/analysis/diagnosed.h"
 #include "tests/message_of.h"
 #include "tests/own_folder.h"
 
@@ -163,7 +165,8 @@ TEST_F(WalkFolder, OneHeavierLegIsNamed) {
   write(drawn({{"leg_mass.mass_ratio", 1.08}}, 12));
   DiagnosisOptions options;
   options.catalogue = {"leg_mass", "impact_loss", "slope_deg_drift"};
-  const Diagnosis answer = diagnose_walks(*read_walks(folder_), options);
+  const auto walks = read_walks(folder_);
+  const Diagnosis answer = decided(*machine_transitions(walks->machine, walks->runs), options);
   EXPECT_EQ(answer.verdict, Verdict::explained);
   ASSERT_FALSE(answer.causes.ranked.empty());
   EXPECT_EQ(answer.causes.ranked.front().name(), "leg_mass");
