@@ -40,16 +40,16 @@ class Pilot {
     if (!options_.level && -std::log(ensemble_.survival()) > frequent_failures * static_cast<double>(ensemble_.steps()))
       return told();
     Levels levels{options_.level ? options_.level : distance_level(frames_, map_.dimension), {}};
-    const std::uint64_t failed_before = ensemble_.failures();
+    const std::uint64_t failed_before = ensemble_.failures(), calls_before = calls();
+    std::uint64_t failed = 0;
     auto steps = std::max(window, revolutions(shortest_spread));
     std::size_t bins = 0;
     do {
-      if (calls() > options_.most_calls)
+      if (calls() - calls_before > options_.most_calls)
         throw std::runtime_error(fmt::format(
             "splitting: {} in {} steps of the map, pushed as far from the middle as they go: no number is "
             "given",
-            ensemble_.failures() == 0 ? "nothing fails" : fmt::format("only {} replicas fail", ensemble_.failures()),
-            calls()));
+            failed == 0 ? "nothing fails" : fmt::format("only {} replicas fail", failed), calls() - calls_before));
       split(levels);
       // If no bin was added, few replicas reach beyond the last one, and the next spread gives them more steps.
       const std::size_t now = levels.edges.front().size();
@@ -57,7 +57,8 @@ class Pilot {
       bins = now;
       spread(steps);
       if (ensemble_.all_failed()) return none_left();
-    } while (ensemble_.failures() - failed_before < enough_failures);
+      failed = ensemble_.failures() - failed_before;
+    } while (failed < enough_failures);
     for (int k = 0; k < refinements; ++k) {
       if (!options_.level) {
         LearntLevel learnt = learn_level(map_, frames_, visits_, levels.edges,

@@ -28,7 +28,7 @@ struct LevelPilot {
   Levels levels;          ///< empty where failures are so frequent that nothing is to be split
   bool all_fail = false;  ///< hardly_any walk was left after 64 steps, or none after some: there are no survivors
   double mixing_steps =
-      0;  ///< after which left_of_memory is left of what is remembered of a state, by linear regression
+      0;  ///< after which left_of_memory is left of what is remembered of a state, by a regression of ranks
   std::uint64_t window = 0;  ///< in which failures that begin in the middle come about [steps]
   std::uint64_t calls = 0;
 };

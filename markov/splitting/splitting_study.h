@@ -31,7 +31,7 @@ struct SplittingOptions {
 struct SplittingStudy {
   MeshEstimate steps;            ///< expected steps before failure from the start
   MeshEstimate failure_rate;     ///< a step, from the quasi-stationary distribution
-  double mixing_steps = 0;       ///< e-folding of what is remembered of a state, by linear regression
+  double mixing_steps = 0;       ///< e-folding of what is remembered of a state, by a regression of ranks
   std::vector<double> survival;  ///< [k]: share that walks on after k + 1 steps; beyond the last at the failure rate
   /// Walks fail before the start is forgotten (less than 1e-6 of them is left). Then steps are counted, nothing is
   /// split, and there are no survivors to speak of: the failure rate and the mixing steps are NaN, and `rates` is

@@ -96,6 +96,28 @@ TEST(SplittingStudy, FallingWalksDoNotPassForMemory) {
   expect_near(study, simulate_steps(running_away(), start, {.trials = 4000, .threads = 1})->mean);
 }
 
+/// Beyond 2.5 the first number is lost, and a second one counts six steps to failure.
+BatchMap lost_for_six_steps() {
+  BatchMap map;
+  map.dimension = 2;
+  map.step = [](int, auto states, auto scores, auto next, auto failed) {
+    for (std::size_t i = 0; i < failed.size(); ++i) {
+      const bool lost = states[2 * i + 1] > 0;
+      next[2 * i] = lost ? 0 : 0.5 * states[2 * i] + 0.8 * scores[i];
+      next[2 * i + 1] = lost ? states[2 * i + 1] + 1 : std::abs(next[2 * i]) > 2.5;
+      failed[i] = next[2 * i + 1] > 6;
+    }
+  };
+  return map;
+}
+
+TEST(SplittingStudy, AWalkThatIsBoundToFailDoesNotPassForMemory) {
+  const std::vector<double> start{0, 0};
+  const SplittingStudy study = splitting_study(lost_for_six_steps(), start, quick);
+  EXPECT_LT(study.mixing_steps, 12);
+  expect_near(study, simulate_steps(lost_for_six_steps(), start, {.trials = 4000, .threads = 1})->mean);
+}
+
 TEST(SplittingStudy, CountsStepsWhereWalksFailBeforeTheStartIsForgotten) {
   BatchMap map;
   map.dimension = map.scores = 1;
