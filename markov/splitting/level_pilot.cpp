@@ -34,11 +34,11 @@ class Pilot {
   }
 
   LevelPilot run() {
-    if (!settle()) return none_left();
+    if (!settle()) return finish(true);
     const std::uint64_t window = revolutions(1.5 * pilot_.mixing_steps);
     pilot_.window = window;
     if (!options_.level && -std::log(ensemble_.survival()) > frequent_failures * static_cast<double>(ensemble_.steps()))
-      return told();
+      return finish(false);
     Levels levels{options_.level ? options_.level : distance_level(frames_, map_.dimension), {}};
     const std::uint64_t failed_before = ensemble_.failures(), calls_before = calls();
     std::uint64_t failed = 0;
@@ -56,7 +56,7 @@ class Pilot {
       if (now <= bins) steps += revolutions(static_cast<double>(steps) / 2);
       bins = now;
       spread(steps);
-      if (ensemble_.all_failed()) return none_left();
+      if (ensemble_.all_failed()) return finish(true);
       failed = ensemble_.failures() - failed_before;
     } while (failed < enough_failures);
     for (int k = 0; k < refinements; ++k) {
@@ -72,20 +72,16 @@ class Pilot {
       }
       split(levels);
       spread(std::max(2 * pilot_.window, revolutions(shortest_spread)));
-      if (ensemble_.all_failed()) return none_left();
+      if (ensemble_.all_failed()) return finish(true);
     }
     split(levels);
     pilot_.levels = std::move(levels);
-    return told();
+    return finish(false);
   }
 
  private:
-  LevelPilot none_left() {
-    pilot_.all_fail = true;
-    return told();
-  }
-
-  LevelPilot told() {
+  LevelPilot finish(bool all_fail) {
+    pilot_.all_fail = all_fail;
     pilot_.calls = calls();
     return std::move(pilot_);
   }
@@ -103,7 +99,7 @@ class Pilot {
     const auto phases = static_cast<std::uint64_t>(map_.phases);
     const std::uint64_t kept = std::max<std::uint64_t>(1, (steps / 2 + kept_times - 1) / kept_times);
     for (std::uint64_t n = 0; n < steps && !ensemble_.all_failed(); ++n) {
-      ensemble_.advance();
+      share_ = ensemble_.advance();
       if (options_.told) options_.told();
       if (2 * n + 2 * phases >= steps && n / phases % kept == 0) visits_.add(ensemble_);
     }
@@ -115,7 +111,7 @@ class Pilot {
     for (;;) {
       const bool first = ensemble_.steps() == 0;
       spread(steps);
-      if (ensemble_.all_failed() || (first && ensemble_.survival() < hardly_any)) return false;
+      if (ensemble_.all_failed() || (first && ensemble_.survival() < hardly_any * share_)) return false;
       frames_.clear();
       for (const Visits::Phase& phase : visits_.phases) frames_.emplace_back(map_, phase);
       pilot_.mixing_steps = mixing();
@@ -227,6 +223,7 @@ class Pilot {
   const BatchMap& map_;
   const PilotOptions& options_;
   WeightedEnsemble ensemble_;
+  double share_ = 0;  // that failed in the last step
   Visits visits_;
   std::vector<VisitFrame> frames_;
   LevelPilot pilot_;

@@ -13,7 +13,8 @@ namespace metastable::markov {
 /// The share of a state's memory that is left after the mixing time.
 inline constexpr double left_of_memory = 0.05;
 
-/// The share of walks below which those that are left do not count.
+/// The steps that are left to expect, a walk at the start, below which they do not count: the share of the walks that
+/// are left over the share of them that fails in a step.
 inline constexpr double hardly_any = 1e-6;
 
 struct PilotOptions {
@@ -26,7 +27,7 @@ struct PilotOptions {
 
 struct LevelPilot {
   Levels levels;          ///< empty where failures are so frequent that nothing is to be split
-  bool all_fail = false;  ///< hardly_any walk was left after 64 steps, or none after some: there are no survivors
+  bool all_fail = false;  ///< hardly_any steps were left to expect after 64, or no walk after some: there is no regime
   double mixing_steps =
       0;  ///< after which left_of_memory is left of what is remembered of a state, by a regression of ranks
   std::uint64_t window = 0;  ///< in which failures that begin in the middle come about [steps]

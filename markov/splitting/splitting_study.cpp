@@ -137,25 +137,26 @@ class Study {
     for (const Round& round : rounds_) calls_ += round.ensemble->calls();
   }
 
-  /// Starts rounds anew that are not split, and follows each until hardly_any walk is left.
+  /// Starts rounds anew that are not split, and follows each until hardly_any steps are left to expect.
   SplittingStudy walk_until_all_fail() {
     lost_calls_ = calls_ - found_.pilot_calls;
     rounds_.clear();
     rounds_.resize(static_cast<std::size_t>(options_.rounds));
     const auto told = one_at_a_time([this] { tell(0); });
-    const std::uint64_t most = (options_.most_calls - calls_) / rounds_.size();
+    const std::uint64_t most = (options_.most_calls - std::min(calls_, options_.most_calls)) / rounds_.size();
     parallel_for(rounds_.size(), options_.threads, [&](std::size_t r) {
       Round& round = rounds_[r];
       round.ensemble = std::make_unique<WeightedEnsemble>(map_, start_, options_.replicas, options_.seed, r);
       for (int mark = 0; mark < 2; ++mark) round.ensemble->mark();
       if (options_.last_steps > 0) round.ensemble->remember(options_.last_steps, walks_of_a_round);
-      while (round.ensemble->survival() > hardly_any) {
+      double share = 0;  // that failed in the last step
+      while (round.ensemble->survival() > hardly_any * share) {
         if (round.ensemble->calls() > most)
           throw std::runtime_error(fmt::format(
               "splitting: all {} replicas of a pilot fail in one step, and those of another ensemble walk on "
               "after {} steps: no number is given",
               options_.replicas, round.ensemble->steps()));
-        round.early.push_back(round.ensemble->advance());
+        round.early.push_back(share = round.ensemble->advance());
         told();
       }
     });

@@ -33,9 +33,9 @@ struct SplittingStudy {
   MeshEstimate failure_rate;     ///< a step, from the quasi-stationary distribution
   double mixing_steps = 0;       ///< e-folding of what is remembered of a state, by a regression of ranks
   std::vector<double> survival;  ///< [k]: share that walks on after k + 1 steps; beyond the last at the failure rate
-  /// Walks fail before the start is forgotten (less than 1e-6 of them is left). Then steps are counted, nothing is
-  /// split, and there are no survivors to speak of: the failure rate and the mixing steps are NaN, and `rates` is
-  /// empty.
+  /// Walks fail before the start is forgotten (less than 1e-6 of a step is left to expect). Then steps are counted,
+  /// nothing is split, and there are no survivors to speak of: the failure rate and the mixing steps are NaN, and
+  /// `rates` is empty.
   bool all_failed = false;
   int rounds = 0;
   std::uint64_t round_steps = 0;  ///< that each took

@@ -21,7 +21,8 @@ Json study_json(const markov::SplittingStudy& s) {
   Json survival = {1.0};
   for (const double share : s.survival) survival.push_back(share);
   Json steps = interval_json(s.steps), rate, mixing;
-  steps["from_quasi_stationary"] = steps["from_quasi_stationary_interval_95"] = nullptr;
+  steps["from_quasi_stationary"] = nullptr;
+  steps["from_quasi_stationary_interval_95"] = nullptr;
   if (!s.all_failed) {
     const markov::MeshEstimate regime = markov::steps_from_quasi_stationary(s);
     steps["from_quasi_stationary"] = regime.value;
