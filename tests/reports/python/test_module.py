@@ -12,7 +12,7 @@ import time
 import types
 import unittest
 import unittest.mock
-from contextlib import redirect_stderr, redirect_stdout
+from contextlib import redirect_stderr
 from pathlib import Path
 
 import numpy as np
@@ -104,16 +104,6 @@ class Studies(unittest.TestCase):
                 metastable.study(setting, **options)
         with self.assertRaisesRegex(TypeError, "a Setting, WalkerSetting, Walker or Machine expected, not int"):
             metastable.study(3)
-
-
-class Readme(unittest.TestCase):
-    def test_its_program_runs(self):
-        text = (data.parents[2] / "README.md").read_text()
-        program = text.split("```python\n")[1].split("```")[0]
-        told = io.StringIO()
-        with redirect_stdout(told):
-            exec(program, {})
-        self.assertRegex(told.getvalue(), r"^448\d\d\.\S* \(446\d\d\.\S*, 4[45]\d\d\d\.\S*\) \[1\. ")
 
 
 class Waiting(unittest.TestCase):
