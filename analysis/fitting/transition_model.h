@@ -226,8 +226,8 @@ class TransitionModel {
       std::span<const double> nuisance, std::uint64_t seed) const;
   /// Counts observed collisions at risk, and how many of them led to rest. Zero where outcomes are unknown.
   virtual std::pair<double, double> rests() const = 0;
-  /// Returns the same design with the launches that as many trials might have had, for its expected steps alone: where
-  /// launches are known from no more than these trials. The default, nullptr, says that they are stated.
+  /// Returns the same design with launches of a distribution that these trials leave possible, for its expected steps
+  /// alone: where launches are known from no more than these trials. The default, nullptr, says that they are stated.
   virtual std::unique_ptr<TransitionModel> relaunched(std::uint64_t seed) const;
   /// Finds the expected steps before failure under the model, from its hazard along simulated trials as long as the
   /// measured ones, with launches like theirs: infinity where it never rests.

@@ -194,11 +194,17 @@ MachineRuns Walker::walk() {
   return out;
 }
 
-// Trials of one design: their first rows hold the same columns.
+// Trials of one design: their first rows hold the same columns, at least one.
 struct AlikeLaunches {
   std::vector<std::size_t> trials;
-  std::vector<int> group;  // by trial: of those with the same condition, phase and labels
+  std::vector<int> group;         // by trial: of those with the same condition, phase and labels
+  std::vector<std::size_t> seen;  // sensors
+  Eigen::MatrixXd points;         // [trials x seen]
 };
+
+void launch_at(MachineTrial& trial, const std::vector<std::size_t>& seen, const Eigen::VectorXd& values) {
+  for (std::size_t c = 0; c < seen.size(); ++c) trial.rows.front().seen[seen[c]] = values[static_cast<Eigen::Index>(c)];
+}
 
 std::vector<AlikeLaunches> alike_launches(const MachineRuns& runs) {
   std::map<std::vector<bool>, AlikeLaunches> by_columns;
@@ -216,54 +222,51 @@ std::vector<AlikeLaunches> alike_launches(const MachineRuns& runs) {
         known.try_emplace({trial.condition, row.phase, row.labels}, number).first->second);
   }
   std::vector<AlikeLaunches> all;
-  for (auto& [columns, alike] : by_columns) all.push_back(std::move(alike));
+  for (auto& [columns, alike] : by_columns) {
+    for (std::size_t j = 0; j < columns.size(); ++j)
+      if (columns[j]) alike.seen.push_back(j);
+    if (alike.seen.empty()) continue;
+    alike.points.resize(static_cast<Eigen::Index>(alike.trials.size()), static_cast<Eigen::Index>(alike.seen.size()));
+    for (std::size_t i = 0; i < alike.trials.size(); ++i)
+      for (std::size_t c = 0; c < alike.seen.size(); ++c)
+        alike.points(static_cast<Eigen::Index>(i), static_cast<Eigen::Index>(c)) =
+            runs.trials[alike.trials[i]].rows.front().seen[alike.seen[c]];
+    all.push_back(std::move(alike));
+  }
   return all;
 }
 
 }  // namespace
 
-MachineRuns smoothed_launches(const Machine& machine, const MachineRuns& runs, const MachineHypothesis& supposed,
-                              std::uint64_t seed) {
+MachineRuns smoothed_launches(const MachineRuns& runs, const MachineHypothesis& supposed, std::uint64_t seed) {
   MachineRuns out = runs;
   for (const AlikeLaunches& alike : alike_launches(runs)) {
-    std::vector<std::size_t> seen;  // sensors
-    for (std::size_t j = 0; j < machine.observe.size(); ++j)
-      if (!std::isnan(runs.trials[alike.trials.front()].rows.front().seen[j])) seen.push_back(j);
-    if (seen.empty()) continue;
-    const auto size = static_cast<Eigen::Index>(seen.size());
-    Eigen::MatrixXd points(static_cast<Eigen::Index>(alike.trials.size()), size);
+    const auto size = static_cast<Eigen::Index>(alike.seen.size());
     Eigen::VectorXd errors(size), normals(size);
     for (Eigen::Index c = 0; c < size; ++c) {
-      const std::size_t j = seen[static_cast<std::size_t>(c)];
-      for (std::size_t i = 0; i < alike.trials.size(); ++i)
-        points(static_cast<Eigen::Index>(i), c) = runs.trials[alike.trials[i]].rows.front().seen[j];
+      const std::size_t j = alike.seen[static_cast<std::size_t>(c)];
       const double added = supposed.added_noise.empty() ? 0 : supposed.added_noise[j];
       // The values hold one error, and a simulation takes off another.
       errors[c] = 2 * (supposed.sensor_sd[j] * supposed.sensor_sd[j] + added * added);
     }
-    const SmoothSample sample(points, alike.group, errors);
+    const SmoothSample sample(alike.points, alike.group, errors);
     for (std::size_t i = 0; i < alike.trials.size(); ++i) {
       const Draws draws(seed, alike.trials[i]);
       for (Eigen::Index c = 0; c < size; ++c) normals[c] = draws.normal(0, kernel + static_cast<std::size_t>(c));
-      const Eigen::VectorXd drawn = sample.draw(i, draws.uniform(0, donor), normals);
-      for (Eigen::Index c = 0; c < size; ++c)
-        out.trials[alike.trials[i]].rows.front().seen[seen[static_cast<std::size_t>(c)]] = drawn[c];
+      launch_at(out.trials[alike.trials[i]], alike.seen, sample.draw(i, draws.uniform(0, donor), normals));
     }
   }
   return out;
 }
 
-MachineRuns resampled_launches(const MachineRuns& runs, std::uint64_t seed) {
+MachineRuns redrawn_launches(const MachineRuns& runs, std::uint64_t seed) {
   MachineRuns out = runs;
   for (const AlikeLaunches& alike : alike_launches(runs)) {
-    std::map<int, std::vector<std::size_t>> members;
-    for (std::size_t i = 0; i < alike.trials.size(); ++i) members[alike.group[i]].push_back(alike.trials[i]);
-    for (std::size_t i = 0; i < alike.trials.size(); ++i) {
-      const std::vector<std::size_t>& of = members[alike.group[i]];
-      const double place = Draws(seed, alike.trials[i]).uniform(0, donor) * static_cast<double>(of.size());
-      const std::size_t like = of[std::min(of.size() - 1, static_cast<std::size_t>(place))];
-      out.trials[alike.trials[i]].rows.front().seen = runs.trials[like].rows.front().seen;
-    }
+    std::vector<double> uniforms;
+    for (const std::size_t t : alike.trials) uniforms.push_back(Draws(seed, t).uniform(0, donor));
+    const Eigen::MatrixXd drawn = reflected_bootstrap(alike.points, alike.group, uniforms);
+    for (std::size_t i = 0; i < alike.trials.size(); ++i)
+      launch_at(out.trials[alike.trials[i]], alike.seen, drawn.row(static_cast<Eigen::Index>(i)));
   }
   return out;
 }

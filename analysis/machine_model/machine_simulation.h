@@ -18,11 +18,10 @@ MachineRuns simulate_machine(const Machine& machine, const MachineRuns& runs, co
 /// Draws first rows anew, as likely as the measured ones of trials with the same condition, phase, labels and columns:
 /// from their smoothed distribution (SmoothSample), of which the errors of the sensors are no part once
 /// simulate_machine() has taken them off. Nothing but the first rows differs.
-MachineRuns smoothed_launches(const Machine& machine, const MachineRuns& runs, const MachineHypothesis& supposed,
-                              std::uint64_t seed);
+MachineRuns smoothed_launches(const MachineRuns& runs, const MachineHypothesis& supposed, std::uint64_t seed);
 
-/// Gives each trial the first row of a trial drawn from those with the same condition, phase, labels and columns: the
-/// launches that as many trials might have had (a bootstrap).
-MachineRuns resampled_launches(const MachineRuns& runs, std::uint64_t seed);
+/// Draws the launches that the distribution may be known by instead, among those with the same condition, phase, labels
+/// and columns (reflected_bootstrap()): as far as so many trials leave it open.
+MachineRuns redrawn_launches(const MachineRuns& runs, std::uint64_t seed);
 
 }  // namespace metastable::analysis

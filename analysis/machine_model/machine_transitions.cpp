@@ -106,7 +106,7 @@ class MachineTransitions : public TransitionModel {
   }
   std::unique_ptr<TransitionModel> relaunched(std::uint64_t seed) const override {
     auto copy = std::make_unique<MachineTransitions>(*this);
-    copy->runs_ = resampled_launches(runs_, seed);
+    copy->runs_ = redrawn_launches(runs_, seed);
     return copy;
   }
   double expected_steps(std::span<const double> nuisance, std::span<const EffectTerm> terms,
@@ -237,7 +237,7 @@ double MachineTransitions::expected_steps(std::span<const double> nuisance, std:
   double steps = 0, failed = 0;
   for (std::uint64_t again = 0; steps < enough_steps && failed < enough_failures; ++again) {
     const std::uint64_t now = seed + again * seeds_apart;
-    const MachineRuns launched = smoothed_launches(*machine_, runs_, supposed, now);
+    const MachineRuns launched = smoothed_launches(runs_, supposed, now);
     const MachineRuns drawn = simulate_machine(*machine_, launched, supposed, now);
     for (const MachineTrial& trial : drawn.trials) {
       steps += static_cast<double>(steps_of(trial));
@@ -246,7 +246,7 @@ double MachineTransitions::expected_steps(std::span<const double> nuisance, std:
   }
   double rate = failed / steps;
   if (failed < few_failures && plan_.failing) {
-    const auto trials = drawn(smoothed_launches(*machine_, runs_, supposed, seed), nuisance, terms, seed);
+    const auto trials = drawn(smoothed_launches(runs_, supposed, seed), nuisance, terms, seed);
     const std::vector<double> chances = trials->rest_chances(nuisance, terms);
     double at_risk = 0, expected = 0;
     for (std::size_t e = 0; e < chances.size(); ++e)

@@ -14,6 +14,7 @@ namespace {
 constexpr double farthest = 6;           // from the median, in sds by the median deviation
 constexpr double least_of_normal = 0.5;  // of the width that a normal sample asks for, the least
 constexpr double width_step = 0.85, least_density = 1e-100;
+constexpr double least_kept = 0.05;       // of a variance in a bootstrap: few points may have less by repetition
 constexpr double resolved_spread = 1e-9;  // of the largest: directions with less have none
 
 // Returns the root of a symmetric matrix, or of its pseudo-inverse; what is negative counts as zero.
@@ -36,6 +37,41 @@ std::vector<char> far_points(const Eigen::MatrixXd& points) {
     for (std::size_t i = 0; sd > 0 && i < values.size(); ++i) far[i] = far[i] || values[i] > farthest * sd;
   }
   return far;
+}
+
+// The points that are not far off, the means of their groups, and how they deviate from these.
+struct Scatter {
+  std::vector<std::size_t> near;
+  Eigen::MatrixXd mean, covariance;  // [groups x d], [d x d]
+  double known = 0;                  // degrees of freedom of the covariance
+};
+
+Scatter scatter_of(const Eigen::MatrixXd& points, const std::vector<int>& group, const std::vector<char>& far) {
+  Scatter s;
+  for (std::size_t i = 0; i < group.size(); ++i)
+    if (!far[i]) s.near.push_back(i);
+  const int groups = 1 + *std::ranges::max_element(group);
+  s.mean = Eigen::MatrixXd::Zero(groups, points.cols());
+  s.covariance = Eigen::MatrixXd::Zero(points.cols(), points.cols());
+  Eigen::VectorXd count = Eigen::VectorXd::Zero(groups);
+  for (const std::size_t i : s.near) {
+    s.mean.row(group[i]) += points.row(static_cast<Eigen::Index>(i));
+    ++count[group[i]];
+  }
+  for (Eigen::Index g = 0; g < groups; ++g) s.mean.row(g) /= std::max(1.0, count[g]);
+  for (const std::size_t i : s.near) {
+    const Eigen::RowVectorXd off = points.row(static_cast<Eigen::Index>(i)) - s.mean.row(group[i]);
+    s.covariance += off.transpose() * off;
+  }
+  s.known = static_cast<double>(s.near.size()) - (count.array() > 0).cast<double>().sum();
+  s.covariance /= std::max(1.0, s.known);
+  return s;
+}
+
+Eigen::VectorXd units_of(const Eigen::MatrixXd& covariance) {
+  Eigen::VectorXd unit = covariance.diagonal().cwiseSqrt();
+  for (double& one : unit) one = one > 0 ? one : 1;
+  return unit;
 }
 
 // Returns the width of the kernel, in units of the sample's spread, under which points are likeliest from all others
@@ -67,26 +103,12 @@ SmoothSample::SmoothSample(const Eigen::MatrixXd& points, std::vector<int> group
   const Eigen::Index d = points.cols();
   if (d < 1 || points.rows() < 1 || static_cast<std::size_t>(points.rows()) != group_.size() || removed.size() != d)
     throw std::invalid_argument("SmoothSample: points, groups and variances differ in number");
-  for (std::size_t i = 0; i < group_.size(); ++i)
-    if (!far_[i]) near_.push_back(i);
-  const int groups = 1 + *std::ranges::max_element(group_);
-  mean_ = Eigen::MatrixXd::Zero(groups, d);
-  Eigen::VectorXd count = Eigen::VectorXd::Zero(groups);
-  for (const std::size_t i : near_) {
-    mean_.row(group_[i]) += points_.row(static_cast<Eigen::Index>(i));
-    ++count[group_[i]];
-  }
-  for (Eigen::Index g = 0; g < groups; ++g) mean_.row(g) /= std::max(1.0, count[g]);
-  Eigen::MatrixXd covariance = Eigen::MatrixXd::Zero(d, d);
-  for (const std::size_t i : near_) {
-    const Eigen::RowVectorXd off = points_.row(static_cast<Eigen::Index>(i)) - mean_.row(group_[i]);
-    covariance += off.transpose() * off;
-  }
-  const double known = static_cast<double>(near_.size()) - (count.array() > 0).cast<double>().sum();
-  covariance /= std::max(1.0, known);
+  const Scatter scatter = scatter_of(points_, group_, far_);
+  near_ = scatter.near;
+  mean_ = scatter.mean;
+  const Eigen::MatrixXd& covariance = scatter.covariance;
   // Coordinates have units of their own: their spreads are compared in those of the sample.
-  Eigen::VectorXd unit = covariance.diagonal().cwiseSqrt();
-  for (double& one : unit) one = one > 0 ? one : 1;
+  const Eigen::VectorXd unit = units_of(covariance);
   const Eigen::MatrixXd measured = unit.cwiseInverse().asDiagonal() * covariance * unit.cwiseInverse().asDiagonal();
   Eigen::MatrixXd left = measured;
   left.diagonal() -= removed.cwiseQuotient(unit.cwiseAbs2());
@@ -107,6 +129,38 @@ Eigen::VectorXd SmoothSample::draw(std::size_t i, double uniform, const Eigen::V
   const auto like = static_cast<Eigen::Index>(near_[at]);
   const Eigen::VectorXd off = points_.row(like) - mean_.row(group_[near_[at]]);
   return mean_.row(group_[i]).transpose() + turn_ * off + kernel_ * normals;
+}
+
+Eigen::MatrixXd reflected_bootstrap(const Eigen::MatrixXd& points, const std::vector<int>& group,
+                                    std::span<const double> uniforms) {
+  std::vector<std::vector<std::size_t>> members(static_cast<std::size_t>(1 + *std::ranges::max_element(group)));
+  for (std::size_t i = 0; i < group.size(); ++i) members[static_cast<std::size_t>(group[i])].push_back(i);
+  const std::vector<char> far = far_points(points);
+  Eigen::MatrixXd drawn(points.rows(), points.cols());
+  std::vector<char> drawn_far(far.size());
+  for (std::size_t i = 0; i < group.size(); ++i) {
+    const std::vector<std::size_t>& of = members[static_cast<std::size_t>(group[i])];
+    const std::size_t like =
+        of[std::min(of.size() - 1, static_cast<std::size_t>(uniforms[i] * static_cast<double>(of.size())))];
+    drawn.row(static_cast<Eigen::Index>(i)) = points.row(static_cast<Eigen::Index>(like));
+    drawn_far[i] = far[like];
+  }
+  const Scatter was = scatter_of(points, group, far), is = scatter_of(drawn, group, drawn_far);
+  if (!(std::min(was.known, is.known) > static_cast<double>(points.cols()))) return drawn;
+  const Eigen::VectorXd unit = units_of(was.covariance);
+  const Eigen::MatrixXd measured = unit.cwiseInverse().asDiagonal() * was.covariance * unit.cwiseInverse().asDiagonal();
+  const Eigen::MatrixXd white = root(measured, true) * unit.cwiseInverse().asDiagonal();
+  const markov::SymmetricEigen split = markov::symmetric_eigen(white * is.covariance * white.transpose());
+  Eigen::VectorXd of = split.values;
+  for (double& value : of) value = 1 / std::max(value, least_kept);
+  const Eigen::MatrixXd turn =
+      unit.asDiagonal() * root(measured, false) * split.vectors * of.asDiagonal() * split.vectors.transpose() * white;
+  for (const std::size_t i : is.near) {
+    const Eigen::RowVectorXd mean = is.mean.row(group[i]);
+    const auto row = static_cast<Eigen::Index>(i);
+    drawn.row(row) = mean + (drawn.row(row) - mean) * turn.transpose();
+  }
+  return drawn;
 }
 
 }  // namespace metastable::analysis
