@@ -13,6 +13,8 @@ constexpr double bend_share = 1.0 / 18;       // (h^2 - 1) / (4 h^4) with h^2 = 
 constexpr double rounding = 1e-14;            // of a variance
 constexpr double almost_sure = 1 - 1e-12;     // a chance of failure
 constexpr double least_weight = 1e-10;        // of a cell that counts
+constexpr double small_move = 0.05;           // sds by which an offset and a score are compared
+constexpr double unlike_share = 1e-3;         // of an offset's square, that may be unlike the score it is merged with
 
 // Returns the lower root L of L L^T = covariance, with zero columns where there is no variance of its own.
 template <class Matrix>
@@ -225,6 +227,66 @@ typename BeliefStep<Most>::Bend BeliefStep<Most>::bend_at(std::size_t trial, con
   return bend;
 }
 
+// Seeks an offset and a score of the lattice that move the state alike in all trials. Where they act through one value,
+// the map bends in their sum: an offset as wide as the noise is no normal belief to it.
+template <int Most>
+void BeliefStep<Most>::seek_merged(std::span<const TransitionPlace> places, std::span<const Part> beliefs) {
+  sought_ = true;
+  const std::size_t axes = lattice_.scores.size(), offsets = stepper_.offsets(), each = 2 * (axes + offsets);
+  if (axes == 0 || offsets == 0 || stepper_.remembers()) return;
+  const Vector still = Vector::Zero(static_cast<Eigen::Index>(stepper_.scores()));
+  const auto sd = [&](std::size_t offset) {
+    const auto at = states() + static_cast<Eigen::Index>(offset);
+    return std::sqrt(beliefs.front().covariance(at, at));
+  };
+  stepper_.clear();
+  for (std::size_t t = 0; t < places.size(); ++t) {
+    const Vector mean = beliefs[t].mean.head(size());
+    for (const double sign : {small_move, -small_move}) {
+      for (const std::size_t score : lattice_.scores)
+        stepper_.add(places[t], mean, sign * Vector::Unit(still.size(), static_cast<Eigen::Index>(score)));
+      for (std::size_t i = 0; i < offsets; ++i)
+        stepper_.add(places[t], mean + sign * sd(i) * Vector::Unit(size(), states() + static_cast<Eigen::Index>(i)),
+                     still);
+    }
+  }
+  stepper_.run();
+  Eigen::MatrixXd moves =
+      Eigen::MatrixXd::Zero(states() * static_cast<Eigen::Index>(places.size()), static_cast<Eigen::Index>(each / 2));
+  for (std::size_t t = 0; t < places.size(); ++t)
+    for (std::size_t i = 0; i < each / 2; ++i)
+      if (const std::size_t up = t * each + i, down = up + each / 2; !stepper_.failed(up) && !stepper_.failed(down))
+        moves.block(static_cast<Eigen::Index>(t) * states(), static_cast<Eigen::Index>(i), states(), 1) =
+            stepper_.next(up) - stepper_.next(down);
+  for (std::size_t i = 0; i < offsets && !merged_; ++i)
+    for (std::size_t b = 0; b < axes && !merged_; ++b) {
+      const auto offset = moves.col(static_cast<Eigen::Index>(axes + i)),
+                 score = moves.col(static_cast<Eigen::Index>(b));
+      const double alike = offset.dot(score), square = score.squaredNorm();
+      if (alike * alike > (1 - unlike_share) * square * offset.squaredNorm())
+        merged_ = Merged{states() + static_cast<Eigen::Index>(i), b, alike / square / sd(i)};
+    }
+}
+
+// Turns the coordinates of a belief's points so that the merged offset's share of the sum is on the lattice; returns
+// the root of what is left of the belief.
+template <int Most>
+BeliefMatrix<Most> BeliefStep<Most>::turned(const TransitionPlace& place, const Part& belief, Matrix root) {
+  Vector& carried = carried_.emplace_back();
+  if (!merged_) return root;
+  ScoreTurn turn{lattice_.scores[merged_->axis], merged_->offset,
+                 merged_->ratio * root(merged_->offset, merged_->offset), belief.mean.head(size()),
+                 root.topLeftCorner(size(), size())};
+  const auto shared = static_cast<Eigen::Index>(shared_);
+  carried = Vector::Zero(size() + 2 * shared + bent());
+  carried.segment(states(), size() - states()) = root.col(merged_->offset).segment(states(), size() - states());
+  carried.segment(size() + shared, shared) = root.col(merged_->offset).tail(shared);
+  carried *= turn.ratio / turn.length();
+  root.col(merged_->offset) /= turn.length();
+  stepper_.turn(place.trial, std::move(turn));
+  return root;
+}
+
 // Moves a part from scores of zero to a cell.
 template <int Most>
 void BeliefStep<Most>::take_cell(Part& part, std::size_t trial, const Cell& cell) const {
@@ -245,6 +307,10 @@ void BeliefStep<Most>::take_cell(Part& part, std::size_t trial, const Cell& cell
       const double fresh = std::sqrt(1 - std::pow(stepper_.memory(lattice_.scores[b]), 2));
       part.mean[before + static_cast<Eigen::Index>(lattice_.scores[b])] += fresh * cell.by_score[b].mean;
       column[before + static_cast<Eigen::Index>(lattice_.scores[b])] = fresh * sd;
+    }
+    if (merged_ && merged_->axis == b) {
+      part.mean += cell.by_score[b].mean * carried_[trial];
+      column += sd * carried_[trial];
     }
     if (bent_) column[part.mean.size() - bent() + static_cast<Eigen::Index>(b)] = sd;
     part.covariance += column * column.transpose();
@@ -306,8 +372,13 @@ void BeliefStep<Most>::on_lattice(AfterStep<Most>& after, std::size_t trial, con
 template <int Most>
 void BeliefStep<Most>::step(std::span<const TransitionPlace> places, std::span<const Part> beliefs,
                             const std::function<void(std::size_t, AfterStep<Most>&)>& take) {
-  std::vector<Matrix> roots;
-  for (const Part& belief : beliefs) roots.push_back(root_of(belief.covariance));
+  if (!sought_) seek_merged(places, beliefs);
+  std::vector<Matrix> roots, left;
+  carried_.clear();
+  for (std::size_t t = 0; t < places.size(); ++t) {
+    roots.push_back(root_of(beliefs[t].covariance));
+    left.push_back(turned(places[t], beliefs[t], roots[t]));
+  }
   used_.clear();
   for (Eigen::Index i = 0; !roots.empty() && i < roots.front().cols(); ++i)
     if (std::ranges::any_of(roots, [&](const Matrix& root) { return root.col(i).head(size()).any(); }))
@@ -327,9 +398,9 @@ void BeliefStep<Most>::step(std::span<const TransitionPlace> places, std::span<c
     if (!lattice_.scores.empty()) {
       const std::size_t first = line;
       while (line < lines.size() && lines[line].trial == t) ++line;
-      on_lattice(after, t, beliefs[t], roots[t], std::span(lines).subspan(first, line - first), edges);
+      on_lattice(after, t, beliefs[t], left[t], std::span(lines).subspan(first, line - first), edges);
     } else {
-      after.belief.parts().push_back(part(slopes(t), beliefs[t], roots[t]));
+      after.belief.parts().push_back(part(slopes(t), beliefs[t], left[t]));
     }
     take(t, after);
   }

@@ -3,6 +3,7 @@
 
 #include <Eigen/Core>
 #include <functional>
+#include <optional>
 #include <span>
 #include <vector>
 
@@ -57,6 +58,8 @@ class BeliefStep {
   struct Bend;
   Bend bend_at(std::size_t trial, const Cell& cell) const;
   void take_cell(Part& part, std::size_t trial, const Cell& cell) const;
+  void seek_merged(std::span<const TransitionPlace> places, std::span<const Part> beliefs);
+  Matrix turned(const TransitionPlace& place, const Part& belief, Matrix root);
   Eigen::Index bent() const { return bent_ ? static_cast<Eigen::Index>(lattice_.scores.size()) : 0; }
   void on_lattice(AfterStep<Most>& after, std::size_t trial, const Part& belief, const Matrix& root,
                   std::span<const FailureLine<Most>> lines, const FailureEdges<Most>& edges) const;
@@ -69,6 +72,16 @@ class BeliefStep {
   std::vector<std::size_t> straight_;  // scores that are not on the lattice
   std::vector<Eigen::Index> used_;     // columns of the roots that move points
   std::size_t points_ = 0;             // of a trial
+
+  // An offset that moves the state as a score of the lattice does.
+  struct Merged {
+    Eigen::Index offset = 0;  // its place in the point
+    std::size_t axis = 0;     // of the lattice
+    double ratio = 0;         // what a unit of it does, in what a unit of the score does
+  };
+  std::optional<Merged> merged_;
+  bool sought_ = false;
+  std::vector<Vector> carried_;  // by belief: of the part's vector, what moves with a unit of the merged score
 };
 
 }  // namespace metastable::analysis

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <utility>
 
 namespace metastable::analysis {
 namespace {
@@ -47,8 +48,37 @@ double MachineStepper::value_at(std::size_t value, const TransitionPlace& place,
   return std::clamp(x, lower_[value], upper_[value]);
 }
 
+MachineStepper MachineStepper::another() const {
+  MachineStepper other(machine_, runs_, supposed_);
+  other.turns_ = turns_;
+  return other;
+}
+
+void MachineStepper::turn(std::size_t trial, ScoreTurn turn) {
+  turns_.resize(runs_.trials.size());
+  turns_[trial] = std::move(turn);
+}
+
 void MachineStepper::add(const TransitionPlace& place, const Eigen::Ref<const Eigen::VectorXd>& point,
                          const Eigen::Ref<const Eigen::VectorXd>& fresh) {
+  if (turns_.empty() || !turns_[place.trial]) return add_straight(place, point, fresh);
+  const ScoreTurn& turn = *turns_[place.trial];
+  const Eigen::Index rows = turn.column + 1;
+  const Eigen::VectorXd off = point.head(rows) - turn.mean.head(rows);
+  // Columns without variance of their own are zero: nothing is along them.
+  Eigen::VectorXd along = Eigen::VectorXd::Zero(rows);
+  for (Eigen::Index i = 0; i < rows; ++i)
+    if (turn.root(i, i) > 0) along[i] = (off[i] - turn.root.row(i).head(i).dot(along.head(i))) / turn.root(i, i);
+  const auto score = static_cast<Eigen::Index>(turn.score);
+  const double w = along[turn.column], u = fresh[score];
+  Eigen::VectorXd turned = fresh;
+  turned[score] = (u - turn.ratio * w) / turn.length();
+  const double y = (turn.ratio * u + w) / turn.length();
+  add_straight(place, point + (y - w) * turn.root.col(turn.column), turned);
+}
+
+void MachineStepper::add_straight(const TransitionPlace& place, const Eigen::Ref<const Eigen::VectorXd>& point,
+                                  const Eigen::Ref<const Eigen::VectorXd>& fresh) {
   places_.push_back(place);
   states_.insert(states_.end(), point.data(), point.data() + states());
   const double scatter = supposed_.scatter.empty() ? 1 : supposed_.scatter[place.number];

@@ -2,7 +2,9 @@
 // Steps a machine from many points of its trials in one call.
 
 #include <Eigen/Core>
+#include <cmath>
 #include <cstdint>
+#include <optional>
 #include <vector>
 
 #include "analysis/machine_model/machine.h"
@@ -14,6 +16,18 @@ namespace metastable::analysis {
 /// The place of a transition: its trial, the row it starts from, and its number over all trials.
 struct TransitionPlace {
   std::size_t trial = 0, row = 0, number = 0;
+};
+
+/// A turn of the coordinates in which a trial's points are given: where an offset and a noise act through one value,
+/// the map bends in their sum alone. With x of the noise and y along the root's column both standard normal, points are
+/// given with u = (x + ratio y) / n for x and w = (y - ratio x) / n for y, n^2 = 1 + ratio^2: w hardly moves the state.
+struct ScoreTurn {
+  std::size_t score = 0;    ///< of x
+  Eigen::Index column = 0;  ///< of y
+  double ratio = 0;         ///< what y moves the state by, in what x does
+  Eigen::VectorXd mean;     ///< [size()] about which y is measured
+  Eigen::MatrixXd root;     ///< [size() x size()] lower root of the covariance of points about it
+  double length() const { return std::sqrt(1 + ratio * ratio); }
 };
 
 /// Gathers points, each a state with what differs in its trial and the scores before, and steps them together.
@@ -30,8 +44,10 @@ class MachineStepper {
   std::size_t size() const { return states() + offsets() + (remembers() ? scores() : 0); }
 
   /// Returns one of the same machine, runs and hypothesis without a point.
-  MachineStepper another() const { return {machine_, runs_, supposed_}; }
+  MachineStepper another() const;
   void clear();
+  /// Takes the points of a trial in turned coordinates from now on.
+  void turn(std::size_t trial, ScoreTurn turn);
   /// Adds a point. @param point  [size()] @param fresh  [scores()] normal scores of this step
   void add(const TransitionPlace& place, const Eigen::Ref<const Eigen::VectorXd>& point,
            const Eigen::Ref<const Eigen::VectorXd>& fresh);
@@ -44,6 +60,8 @@ class MachineStepper {
   bool failed(std::size_t point) const { return failed_[point] != 0; }
 
  private:
+  void add_straight(const TransitionPlace& place, const Eigen::Ref<const Eigen::VectorXd>& point,
+                    const Eigen::Ref<const Eigen::VectorXd>& fresh);
   double value_at(std::size_t value, const TransitionPlace& place,
                   const Eigen::Ref<const Eigen::VectorXd>& point) const;
 
@@ -56,6 +74,7 @@ class MachineStepper {
   std::vector<std::vector<double>> values_;  // by value
   std::vector<std::uint8_t> failed_;
   std::vector<TransitionPlace> places_;
+  std::vector<std::optional<ScoreTurn>> turns_;  // by trial; empty: none
 };
 
 }  // namespace metastable::analysis

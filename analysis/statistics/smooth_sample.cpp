@@ -136,29 +136,31 @@ Eigen::MatrixXd reflected_bootstrap(const Eigen::MatrixXd& points, const std::ve
   std::vector<std::vector<std::size_t>> members(static_cast<std::size_t>(1 + *std::ranges::max_element(group)));
   for (std::size_t i = 0; i < group.size(); ++i) members[static_cast<std::size_t>(group[i])].push_back(i);
   const std::vector<char> far = far_points(points);
-  Eigen::MatrixXd drawn(points.rows(), points.cols());
-  std::vector<char> drawn_far(far.size());
+  Eigen::MatrixXd again(points.rows(), points.cols()), drawn = points;
+  std::vector<char> again_far(far.size());
   for (std::size_t i = 0; i < group.size(); ++i) {
     const std::vector<std::size_t>& of = members[static_cast<std::size_t>(group[i])];
     const std::size_t like =
         of[std::min(of.size() - 1, static_cast<std::size_t>(uniforms[i] * static_cast<double>(of.size())))];
-    drawn.row(static_cast<Eigen::Index>(i)) = points.row(static_cast<Eigen::Index>(like));
-    drawn_far[i] = far[like];
+    const auto row = static_cast<Eigen::Index>(i);
+    again.row(row) = points.row(static_cast<Eigen::Index>(like));
+    again_far[i] = far[like];
+    if (far[i] || far[like]) drawn.row(row) = again.row(row);
   }
-  const Scatter was = scatter_of(points, group, far), is = scatter_of(drawn, group, drawn_far);
-  if (!(std::min(was.known, is.known) > static_cast<double>(points.cols()))) return drawn;
+  const Scatter was = scatter_of(points, group, far), is = scatter_of(again, group, again_far);
+  if (!(std::min(was.known, is.known) > static_cast<double>(points.cols()))) return again;
   const Eigen::VectorXd unit = units_of(was.covariance);
   const Eigen::MatrixXd measured = unit.cwiseInverse().asDiagonal() * was.covariance * unit.cwiseInverse().asDiagonal();
   const Eigen::MatrixXd white = root(measured, true) * unit.cwiseInverse().asDiagonal();
   const markov::SymmetricEigen split = markov::symmetric_eigen(white * is.covariance * white.transpose());
   Eigen::VectorXd of = split.values;
-  for (double& value : of) value = 1 / std::max(value, least_kept);
+  for (double& value : of) value = 1 / std::sqrt(std::max(value, least_kept));
   const Eigen::MatrixXd turn =
       unit.asDiagonal() * root(measured, false) * split.vectors * of.asDiagonal() * split.vectors.transpose() * white;
   for (const std::size_t i : is.near) {
-    const Eigen::RowVectorXd mean = is.mean.row(group[i]);
+    const Eigen::RowVectorXd mean = was.mean.row(group[i]);
     const auto row = static_cast<Eigen::Index>(i);
-    drawn.row(row) = mean + (drawn.row(row) - mean) * turn.transpose();
+    drawn.row(row) = 2 * mean - is.mean.row(group[i]) + (drawn.row(row) - mean) * turn.transpose();
   }
   return drawn;
 }

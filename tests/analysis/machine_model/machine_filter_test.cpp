@@ -155,6 +155,48 @@ TEST(MachineFilter, ScoresOfColumnsThatBendTogetherAreNormal) {
   }
 }
 
+// Two columns that one value w moves along a curve, where w scatters from trial to trial as widely as from step to
+// step: x' = exp(w) shows it, so that the likelihood is that of normals that are equally correlated within a trial.
+TEST(MachineFilter, ASpreadBetweenTrialsWhereTheMapBendsHasItsLikelihood) {
+  constexpr double sd = 0.3, between = 0.4, error = 0.01;
+  constexpr std::size_t trials = 12, rows = 9;
+  Machine machine = linear_machine(error);
+  machine.states = {"x", "y"};
+  machine.parameters = {{"b", 0, 0.1}, {"s", sd, 0.05, 0.01, 2}};
+  machine.effects.clear();
+  machine.observe = {{"x", error, 0}, {"y", error, 0}};
+  machine.step = [](const MachineBatch& batch) {
+    for (std::size_t i = 0; i < batch.rows; ++i) {
+      const double w = batch.value(0, i) + batch.value(1, i) * batch.scores[i];
+      batch.next[2 * i] = std::exp(w);
+      batch.next[2 * i + 1] = w + 0.4 * w * w;
+    }
+  };
+  std::mt19937_64 generator(8);
+  std::normal_distribution<double> normal;
+  MachineRuns runs;
+  double exact = 0;
+  for (std::size_t t = 0; t < trials; ++t) {
+    runs.trials.emplace_back().rows.push_back({.seen = {1, 0}});
+    runs.trials.back().outcome = MachineOutcome::stopped;
+    const double offset = between * normal(generator);
+    double sum = 0, squares = 0;
+    for (std::size_t k = 1; k < rows; ++k) {
+      const double w = offset + sd * normal(generator), off = error * normal(generator);
+      runs.trials.back().rows.push_back({.seen = {std::exp(w), w + 0.4 * w * w + off}});
+      sum += w, squares += w * w;
+      const double spread = error * std::hypot(1, (1 + 0.8 * w) * std::exp(-w));  // of y, given x
+      exact += std::log(dynamics::normal_density(off / spread) / spread) - w;     // of x: dw / dx
+    }
+    constexpr double n = rows - 1, total = sd * sd + n * between * between;
+    exact -= 0.5 * ((squares - between * between / total * sum * sum) / (sd * sd) + std::log(total / (sd * sd))) +
+             n * std::log(sd * std::sqrt(2 * std::numbers::pi));
+  }
+  MachineHypothesis h = nominal_of(machine);
+  h.spreads = {{0, between}};
+  EXPECT_NEAR(followed(machine, runs, h).total(), exact, 1);
+}
+
 // A machine that fails below an edge: x' = x / 2 + 1 + z / 2 where z > edge.
 TEST(MachineFilter, FailureHasTheProbabilityOfTheScoresThatFail) {
   Machine machine = linear_machine(0.05);
