@@ -17,7 +17,8 @@ namespace metastable::markov {
 namespace {
 
 constexpr std::uint64_t burn_in_stream = 0x3000, offsets_stream = 0x4000, choices_stream = 0x5000;
-constexpr double defensive = 0.05;  // share of the guide's mean that every score gets
+constexpr double defensive = 0.05;   // share of the guide's mean that every score gets
+constexpr double about_equal = 0.2;  // sd over mean of the chances to fail after a window: it adds 4 % to the variance
 
 class Guided {
  public:
@@ -225,6 +226,26 @@ GuidedRate guided_failure_rate(const BatchMap& map, const Mesh& mesh, std::span<
   rate.standard_error /= survive;
   rate.rate /= survive;
   return rate;
+}
+
+int reaching_window(const Mesh& mesh, std::span<const double> settled, int most) {
+  if (settled.empty()) return most;
+  const std::vector<std::vector<double>> fails = failure_in_step(mesh, most);
+  for (int window = 1; window < most; ++window) {
+    const std::vector<double>& chance = fails[static_cast<std::size_t>(window)];
+    std::vector<double> mass(static_cast<std::size_t>(mesh.phases()), 0.0), mean = mass, square = mass;
+    for (std::size_t i = 0; i < mesh.size(); ++i) {
+      const auto phase = static_cast<std::size_t>(mesh.phase(i));
+      mass[phase] += settled[i];
+      mean[phase] += settled[i] * chance[i];
+      square[phase] += settled[i] * chance[i] * chance[i];
+    }
+    bool even = true;
+    for (std::size_t p = 0; p < mean.size(); ++p)
+      even = even && square[p] * mass[p] <= (1 + about_equal * about_equal) * mean[p] * mean[p];
+    if (even) return window;
+  }
+  return most;
 }
 
 }  // namespace metastable::markov

@@ -37,4 +37,10 @@ struct GuidedRate {
 GuidedRate guided_failure_rate(const BatchMap& map, const Mesh& mesh, std::span<const double> start,
                                const GuidedOptions& options);
 
+/// Returns the least window, 1 to `most`, after which the mesh foretells failure in the step that follows about equally
+/// likely (to a fifth, as a root of mean squares) from wherever settled survivors are: their weights will be even.
+/// `most` where there is none.
+/// @param settled  MeshPassage::distribution; empty: not known
+int reaching_window(const Mesh& mesh, std::span<const double> settled, int most);
+
 }  // namespace metastable::markov

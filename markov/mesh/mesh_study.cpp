@@ -4,10 +4,12 @@
 
 #include <algorithm>
 #include <boost/math/distributions/students_t.hpp>
+#include <boost/math/special_functions/gamma.hpp>
 #include <cmath>
 #include <limits>
 #include <memory>
 #include <mutex>
+#include <span>
 #include <stdexcept>
 
 #include "markov/mesh/batch_simulation.h"
@@ -29,6 +31,7 @@ namespace {
 constexpr double disagrees = 1.7;      // joint half-widths: 99.9 % of the normal
 constexpr double sampled_windows = 3;  // of guided samples: within one, failures are still few
 constexpr int longest_window = 200;    // of guided samples [steps]
+constexpr double unsampled = 1e-4;     // of the failures: what scores beyond the reach of guided samples may stand for
 constexpr double least_even_share =
     0.5;                              // effective samples a sample: below, their own scatter tells too small an error
 constexpr double sampled_from = 100;  // expected steps above which guided samples settle before they fail
@@ -36,6 +39,7 @@ constexpr double widest = 4;          // of the interval: its end over its begin
 constexpr double most_blind = 0.1;    // of the failures, in blind spots: beyond, bands are stepped over
 constexpr double least = 0.25;        // of what the extrapolation's last order moved: its error
 constexpr double row_error = 5e-4;    // what reading rows off curves may leave, about so much
+constexpr std::size_t fewest_shifts = 3;
 constexpr std::size_t most_trials = 10000000;  // they leave 0.03 % of the steps, and take 80 MB
 // A simulation of fewer trials than this is replaced by walks that do not end at a failure, with half of the steps that
 // the trials would have: an eighth of a quick study's time.
@@ -77,7 +81,7 @@ struct Extrapolated {
 };
 
 /// Extrapolates `logs[shift][size]`; takes `safety` times the discretization error that the sizes show.
-Extrapolated extrapolate(const std::vector<std::vector<double>>& logs, double safety) {
+Extrapolated extrapolate(std::span<const std::vector<double>> logs, double safety) {
   const auto n = static_cast<double>(logs.size());
   const std::size_t sizes = logs.front().size();
   std::vector<double> values, mean(sizes, 0.0);
@@ -115,6 +119,15 @@ SimulationOptions walking(const MeshStudyOptions& options) {
   return {.seed = options.seed, .threads = options.threads, .most_steps = options.simulated_steps};
 }
 
+/// Returns the scores that guided samples must reach: beyond are so few that they bear on no rate as large as this one,
+/// nor on a larger one, and hardly on one ten times smaller.
+double sampled_reach(int scores, int window, double rate) {
+  const double beyond = std::clamp(unsampled * rate / window, 1e-300, 0.5);
+  const double reach = std::sqrt(2 * boost::math::gamma_q_inv(0.5 * scores, beyond));
+  const GuidedOptions most;  // whose lattice is moved by half a spacing on every axis
+  return std::min(most.score_reach, reach + 0.5 * most.score_spacing * std::sqrt(static_cast<double>(scores)));
+}
+
 /// Makes one study.
 class Run {
  public:
@@ -128,9 +141,9 @@ class Run {
         sizes_(options.sizes > 0    ? static_cast<std::size_t>(options.sizes)
                : map.dimension == 4 ? 4
                                     : 3),
-        shifts_(static_cast<std::size_t>(options.shifts)),
+        most_shifts_(static_cast<std::size_t>(options.shifts)),
         at_once_(map.dear ? 1 : std::min(thread_count(options.threads), options.shifts)),
-        steps_(shifts_, std::vector<double>(sizes_)),
+        steps_(most_shifts_, std::vector<double>(sizes_)),
         rates_(steps_),
         brackets_(steps_) {
     study_.sizes.resize(sizes_);
@@ -150,19 +163,12 @@ class Run {
 
   MeshStudy run() {
     foresee_memory();
-    // The long ones come first; the very last, the first shift of the coarsest size, has been made.
-    const std::size_t tasks = sizes_ * shifts_ - 1;
-    const auto make = [&](std::size_t task, const BatchMap& map) {
-      const std::size_t size = sizes_ - 1 - task / shifts_, shift = shifts_ - 1 - task % shifts_;
-      auto mesh = std::make_unique<Mesh>(map, frames_, start_, mesh_options(size, shift));
-      solve(*mesh, size, shift);
-      if (map_.dear && size == 1 && shift == 0) guide_ = std::move(mesh);
-    };
-    if (map_.dear)
-      joined_for(map_, tasks, static_cast<std::size_t>(at_once_), options_.threads, make);
-    else
-      parallel_for(tasks, at_once_, [&](std::size_t task) { make(task, map_); });
-    join();
+    while (shifts_ < most_shifts_ && !settled()) {
+      if (shifts_ > 0) foresee_shifts(1);
+      make_shifts(std::max(fewest_shifts, shifts_ + 1));
+      join();
+    }
+    list_sizes();
     over(meshes_stage);
     foresee_other_ways(study_.steps.value, study_.mixing_steps);
     if (study_.steps.upper > widest * study_.steps.lower)
@@ -193,6 +199,28 @@ class Run {
     one.row_states = study_.row_states;
     if (!several_gaits()) return one;
     return with_gaits(one, study_.gaits);
+  }
+
+  /// Makes the meshes of all sizes of further shifts, up to so many in all.
+  void make_shifts(std::size_t up_to) {
+    // The long ones come first; the very last, the first shift of the coarsest size, has been made.
+    const std::size_t more = up_to - shifts_, tasks = sizes_ * more - (shifts_ == 0 ? 1 : 0);
+    const auto make = [&](std::size_t task, const BatchMap& map) {
+      const std::size_t size = sizes_ - 1 - task / more, shift = up_to - 1 - task % more;
+      auto mesh = std::make_unique<Mesh>(map, frames_, start_, mesh_options(size, shift));
+      solve(*mesh, size, shift);
+      if (guides(size, shift)) guide_ = std::move(mesh);
+    };
+    if (map_.dear)
+      joined_for(map_, tasks, static_cast<std::size_t>(at_once_), options_.threads, make);
+    else
+      parallel_for(tasks, at_once_, [&](std::size_t task) { make(task, map_); });
+    shifts_ = up_to;
+  }
+
+  /// Returns whether a mesh is kept for guided samples.
+  bool guides(std::size_t size, std::size_t shift) const {
+    return options_.guided_samples > 0 && !several_gaits() && size == 1 && shift == 0;
   }
 
   bool several_gaits() const { return study_.gaits.orbits.size() > 1; }
@@ -238,11 +266,17 @@ class Run {
     const double rows = std::max(1.0, coarsest_.rows), mesh_rate = coarsest_.seconds / rows;
     const double row_rate = searched_.seconds / std::max(1.0, searched_.rows);
     const int threads = map_.dear ? 1 : thread_count(options_.threads);
-    double all = -1;
-    for (std::size_t size = 0; size < sizes_; ++size) all += static_cast<double>(shifts_) * mesh_work(size);
+    const double all = static_cast<double>(fewest_shifts) * work_of_a_shift() - 1;
     const std::lock_guard lock(mutex_);
     work_.plan(rows * all, mesh_rate / (map_.dear ? 1 : at_once_));
     for (int other = 0; other < 2; ++other) work_.plan(0, row_rate / threads);
+    tell();
+  }
+
+  /// Foresees the rows of so many more shifts.
+  void foresee_shifts(std::size_t more) {
+    const std::lock_guard lock(mutex_);
+    work_.add(meshes_stage, static_cast<double>(more) * coarsest_.rows * work_of_a_shift());
     tell();
   }
 
@@ -258,8 +292,7 @@ class Run {
     const int forgets = forgetting_steps(std::min(mixing, steps_to_the_orbit()));
     const bool guided = options_.guided_samples > 0 && !several_gaits() && steps > sampled_from &&
                         steps > sampled_windows * std::min(forgets, longest_window);
-    const double grown = map_.dear ? 0 : coarsest_.rows * mesh_work(1);
-    work_.replan(guided_stage, guided ? grown + guided_rows(forgets, std::min(forgets, longest_window)) : 0);
+    work_.replan(guided_stage, guided ? guided_rows(forgets, std::min(forgets, longest_window), 1 / steps) : 0);
     tell();
   }
 
@@ -271,9 +304,9 @@ class Run {
     return static_cast<double>(study_.orbit.frames.size()) / -std::log(modulus);
   }
 
-  double guided_rows(int forgets, int window) const {
+  double guided_rows(int forgets, int window, double rate) const {
     const double lattice = static_cast<double>(
-        ScoreLattice(map_.scores, GuidedOptions().score_spacing, GuidedOptions().score_reach).size());
+        ScoreLattice(map_.scores, GuidedOptions().score_spacing, sampled_reach(map_.scores, window, rate)).size());
     return static_cast<double>(options_.guided_samples) * (2 * forgets + window * lattice);
   }
 
@@ -297,7 +330,7 @@ class Run {
     const double finest = coarse * std::pow(growth, map_.dimension + std::min(map_.scores, map_.dimension));
     if (map_.dear)
       at_once_ = static_cast<int>(std::clamp(memory_side_by_side * static_cast<double>(options_.most_bytes) / finest,
-                                             1.0, static_cast<double>(sizes_ * shifts_ - 1)));
+                                             1.0, static_cast<double>(sizes_ * fewest_shifts - 1)));
     study_.expected_bytes = finest * at_once_;
     if (study_.expected_bytes > static_cast<double>(options_.most_bytes))
       throw std::length_error(fmt::format(
@@ -322,6 +355,7 @@ class Run {
       study_.blind_spots = find_blind_spots(map_, frames_, mesh, passage.visits, mesh_options(0, 0));
     const std::lock_guard lock(mutex_);
     if (size == 0 && shift == 0) coarse_mixing_ = passage.mixing_steps;
+    if (guides(size, shift)) guide_settled_ = std::move(passage.distribution);
     if (shift > 0) return mesh.bytes();
     study_.sizes[size] = {mesh_options(size, 0).spacing, mesh.size(), mesh.entries(), {}};
     if (size + 1 < sizes_) return mesh.bytes();
@@ -340,16 +374,32 @@ class Run {
     return std::pow(std::sqrt(2.0), static_cast<double>(size) * map_.dimension);
   }
 
+  double work_of_a_shift() const {
+    double all = 0;
+    for (std::size_t size = 0; size < sizes_; ++size) all += mesh_work(size);
+    return all;
+  }
+
+  void list_sizes() {
+    for (std::size_t size = 0; size < sizes_; ++size)
+      for (std::size_t shift = 0; shift < shifts_; ++shift)
+        study_.sizes[size].steps.push_back(std::exp(steps_[shift][size]));
+  }
+
+  /// Returns whether further shifts would hardly narrow the intervals.
+  bool settled() const { return shifts_ > 0 && shifts_scatter_ <= 1; }
+
+  /// Joins the shifts made so far.
   void join() {
     for (std::size_t size = 0; size < sizes_; ++size)
-      for (std::size_t shift = 0; shift < shifts_; ++shift) {
-        study_.sizes[size].steps.push_back(std::exp(steps_[shift][size]));
+      for (std::size_t shift = 0; shift < shifts_; ++shift)
         study_.bracket = std::max(study_.bracket, brackets_[shift][size]);
-      }
     // What an extrapolation says of its own error grows with what it left out: as the square of the spacing.
     const double coarser = std::max(1.0, study_.sizes.front().spacing / coarsest(map_.dimension));
-    const Extrapolated by_steps = extrapolate(steps_, coarser * coarser),
-                       by_rate = extrapolate(rates_, coarser * coarser);
+    const Extrapolated by_steps = extrapolate(std::span(steps_).first(shifts_), coarser * coarser),
+                       by_rate = extrapolate(std::span(rates_).first(shifts_), coarser * coarser);
+    shifts_scatter_ = std::max(by_steps.shift_error / (by_steps.discretization_error + study_.bracket),
+                               by_rate.shift_error / (by_rate.discretization_error + study_.bracket));
     study_.shift_error = by_steps.shift_error;
     study_.discretization_error = by_steps.discretization_error;
     study_.steps = around(std::exp(by_steps.log_value),
@@ -457,26 +507,31 @@ class Run {
       study_.no_guided = "not asked: failures are too frequent";
     if (several_gaits()) study_.no_guided = "its samples would know one gait";
     if (!study_.no_guided.empty()) return;
-    if (!guide_) guide_ = std::make_unique<Mesh>(map_, frames_, start_, mesh_options(1, 0));
     // It goes from the start to where failures keep their share: the time to forget the start, some times over. A
     // window too short to reach the failures from an ordinary state leaves the weight to a few rare ones, which few
-    // samples meet: the rate comes out too low. So it is lengthened until the weights are even.
+    // samples meet: the rate comes out too low. So it is as long as the mesh foretells, and lengthened until the
+    // weights are even.
     const int forgets = forgetting_steps(std::min(study_.mixing_steps, steps_to_the_orbit()));
     const BatchMap turns = over_revolutions(map_, static_cast<int>(own_.size()));
     GuidedRate guided;
     double even = 0;
-    for (int window = std::min(forgets, longest_window); even < least_even_share;
-         window = std::min(2 * window, longest_window)) {
+    int window = reaching_window(*guide_, guide_settled_, std::min(forgets, longest_window));
+    {
+      const std::lock_guard lock(mutex_);
+      work_.replan(guided_stage, guided_rows(forgets, window, study_.failure_rate.value));
+    }
+    for (; even < least_even_share; window = std::min(2 * window, longest_window)) {
       if (study_.steps.value <= sampled_windows * window) break;
       if (guided.samples > 0) {
         const std::lock_guard lock(mutex_);
-        work_.add(guided_stage, guided_rows(forgets, window));
+        work_.add(guided_stage, guided_rows(forgets, window, study_.failure_rate.value));
       }
       guided = guided_failure_rate(turns, *guide_, start_,
                                    {.samples = options_.guided_samples,
                                     .burn_in = std::min(2 * forgets, 60000),
                                     .window = window,
                                     .seed = options_.seed,
+                                    .score_reach = sampled_reach(map_.scores, window, study_.failure_rate.value),
                                     .threads = options_.threads});
       even = guided.effective_samples / static_cast<double>(options_.guided_samples);
       if (window == longest_window) break;
@@ -502,15 +557,17 @@ class Run {
   std::span<const double> start_;
   const MeshStudyOptions& options_;
   std::vector<NoiseFrame> frames_;
-  GaitOrbit own_;  ///< states of phase 0, one for each revolution of the gait
-  std::size_t sizes_, shifts_;
-  int at_once_;                                                ///< meshes
+  GaitOrbit own_;                                 ///< states of phase 0, one for each revolution of the gait
+  std::size_t sizes_, most_shifts_, shifts_ = 0;  ///< shifts_: made so far
+  double shifts_scatter_ = 0;                     ///< t-interval over what else the interval holds
+  int at_once_;                                   ///< meshes
   std::vector<std::vector<double>> steps_, rates_, brackets_;  ///< logs, [shift][size]
   MeshStudy study_;
   double tail_rate_ = 0;  ///< a step, beyond the survival of the study
   double coarse_mixing_ = 0;
-  Spent coarsest_, searched_;    ///< on the coarsest mesh, on the search for other gaits
-  std::unique_ptr<Mesh> guide_;  ///< of guided sampling
+  Spent coarsest_, searched_;          ///< on the coarsest mesh, on the search for other gaits
+  std::unique_ptr<Mesh> guide_;        ///< of guided sampling
+  std::vector<double> guide_settled_;  ///< MeshPassage::distribution
   std::mutex mutex_;
   WorkLeft work_;
 };

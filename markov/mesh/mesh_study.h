@@ -22,7 +22,7 @@ namespace metastable::markov {
 struct MeshStudyOptions {
   double spacing = 0;  ///< of the coarsest mesh, in stationary sds; the others' fall by sqrt 2 each. 0: by dimension
   int sizes = 0;       ///< 3 or 4; 0: 3, in four dimensions 4
-  int shifts = 6;      ///< of each size, >= 6
+  int shifts = 6;      ///< of each size, >= 6, at most: fewer, three at least, where they agree
   double margin = 0;   ///< MeshOptions::margin; 0: 12, of several scores 16
   std::uint64_t seed = 1;
   int threads = 0;                    ///< 0: all cores; the bits do not depend on it
@@ -103,24 +103,25 @@ class RefutedMesh : public Disagreement {
 /// reach so far each revolution has a mesh of its own, and no shift is seen. A start that leads to no such orbit
 /// (noise_free_walk) is asked for its first passage alone: other gaits are not looked for.
 ///
-/// Solves `sizes` meshes of `shifts` shifts each, extrapolates ln T to spacing 0 (h^2 and h^4, with four sizes h^6) for
-/// each shift by itself. The interval joins, as a root of squares, the t-interval over the shifts and the
-/// discretization error; the bracket of what leaves the mesh is added, and on its side what blind spots may hold. The
-/// discretization error is the difference from the extrapolation without the coarsest size; with four sizes, at least
-/// that between the two triples'. Meshes coarser than the default count it by the square of the ratio of their
-/// spacings: the sizes show less and less of it.
+/// Solves `sizes` meshes of each shift, extrapolates ln T to spacing 0 (h^2 and h^4, with four sizes h^6) for each
+/// shift by itself. There are three shifts, and one more at a time, `shifts` at most, until their t-interval is no
+/// wider than the other two parts of the interval together. The interval joins, as a root of squares, the t-interval
+/// over the shifts and the discretization error; the bracket of what leaves the mesh is added, and on its side what
+/// blind spots may hold. The discretization error is the difference from the extrapolation without the coarsest size;
+/// with four sizes, at least that between the two triples'. Meshes coarser than the default count it by the square of
+/// the ratio of their spacings: the sizes show less and less of it.
 ///
 /// Beside it stand importance sampling guided by the second coarsest mesh, where T is above 100 steps and above three
 /// windows of it, and direct simulation: trials to failure where 100 or more fit into `simulated_steps`, else 512 walks
-/// of half so many steps together, whose failures are counted (FailureCount). Windows are lengthened
-/// until the samples' weights are even; where they stay uneven, the interval is widened in proportion, and beyond a
-/// factor of about two not given. Two ways disagree when they lie further apart than 1.7 times (99.9 %) their joint 95
-/// % half-width, and a count of failures when the mesh foretells one so far off with a chance below refutation_level.
-/// Where the noise leads to other gaits (OtherGaits), meshes grow from those too and are solved by coupled_passage();
-/// failures are then counted only, and no samples are guided: both would start in one gait and know nothing of the
-/// others. No number is given either where a gait is a trap, where blind spots may hold more than a tenth of the
-/// failures, or where the interval is wider than a factor of four.
-/// Rows are read off states around their nodes where the chance of failing jumps from one state to the next
+/// of half so many steps together, whose failures are counted (FailureCount). Windows are as
+/// long as the mesh foretells (reaching_window) and lengthened until the samples' weights are even; where they stay
+/// uneven, the interval is widened in proportion, and beyond a factor of about two not given. Two ways disagree when
+/// they lie further apart than 1.7 times (99.9 %) their joint 95 % half-width, and a count of failures when the mesh
+/// foretells one so far off with a chance below refutation_level. Where the noise leads to other gaits (OtherGaits),
+/// meshes grow from those too and are solved by coupled_passage(); failures are then counted only, and no samples are
+/// guided: both would start in one gait and know nothing of the others. No number is given either where a gait is a
+/// trap, where blind spots may hold more than a tenth of the failures, or where the interval is wider than a factor of
+/// four. Rows are read off states around their nodes where the chance of failing jumps from one state to the next
 /// (failing_jumps).
 /// A dear map's meshes grow side by side, as many as half the memory holds, in joined steps.
 /// The coarsest mesh comes first: what the finest will take, nodes by the spacing's power and entries

@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include <Eigen/LU>
+#include <algorithm>
 #include <array>
 #include <cmath>
 #include <cstdint>
@@ -351,6 +352,23 @@ TEST(MeshStudy, SameSeedSameBitsOnAnyNumberOfThreads) {
   EXPECT_EQ(one.steps.value, three.steps.value);
   EXPECT_EQ(one.steps.upper, three.steps.upper);
   EXPECT_EQ(one.guided->value, three.guided->value);
+}
+
+TEST(MeshStudy, HasAsManyShiftsAsTheyScatter) {
+  const std::vector<double> start{2};
+  std::size_t fewest = 6;
+  for (const std::uint64_t seed : {1, 2, 3, 4}) {
+    const MeshStudy study =
+        mesh_study(linear_batch(0.8), start, {.seed = seed, .guided_samples = 0, .simulated_steps = 0});
+    const std::size_t shifts = study.sizes.front().steps.size();
+    for (const MeshSize& size : study.sizes) EXPECT_EQ(size.steps.size(), shifts);
+    EXPECT_GE(shifts, 3u);
+    if (shifts < 6) {
+      EXPECT_LE(study.shift_error, study.discretization_error + study.bracket);
+    }
+    fewest = std::min(fewest, shifts);
+  }
+  EXPECT_LT(fewest, 6u);
 }
 
 TEST(MeshStudy, NamesOptionsOutOfRange) {

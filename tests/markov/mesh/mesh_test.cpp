@@ -120,6 +120,21 @@ TEST(GuidedSampling, IsRightHoweverCoarseItsMesh) {
   }
 }
 
+// From most states of survivors failures are far: a step or two lead to none.
+TEST(GuidedSampling, WindowThatTheMeshForetellsHasEvenWeights) {
+  const BatchMap map = linear_batch(0.4);
+  const Mesh mesh = linear_mesh(0.4, 0.4);
+  const MeshPassage passage = mesh_passage(mesh, middle);
+  const int window = reaching_window(mesh, passage.distribution, 30);
+  EXPECT_GT(window, 2);
+  EXPECT_LT(window, 20);
+  EXPECT_EQ(reaching_window(mesh, passage.distribution, window - 1), window - 1);
+  EXPECT_EQ(reaching_window(mesh, {}, 30), 30);
+  const GuidedRate guided = guided_failure_rate(map, mesh, middle, {.samples = 1500, .burn_in = 30, .window = window});
+  EXPECT_GT(guided.effective_samples, 0.5 * 1500);
+  EXPECT_NEAR(guided.rate * linear_steps(0.4, 2), 1, 4 * guided.standard_error / guided.rate);
+}
+
 TEST(GuidedSampling, TakesTurnsAtThePhases) {
   const BatchMap map = two_phase_batch(0.45);
   const Mesh mesh(map, noise_frames(map, middle), middle, {.spacing = 0.1, .score_spacing = 0.3});
