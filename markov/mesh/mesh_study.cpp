@@ -40,6 +40,7 @@ constexpr double most_blind = 0.1;    // of the failures, in blind spots: beyond
 constexpr double least = 0.25;        // of what the extrapolation's last order moved: its error
 constexpr double row_error = 5e-4;    // what reading rows off curves may leave, about so much
 constexpr std::size_t fewest_shifts = 3;
+constexpr double narrow = 0.01;  // half-width of what a few shifts may say: the parts of a wider one are told by many
 constexpr std::size_t most_trials = 10000000;  // they leave 0.03 % of the steps, and take 80 MB
 // A simulation of fewer trials than this is replaced by walks that do not end at a failure, with half of the steps that
 // the trials would have: an eighth of a quick study's time.
@@ -387,7 +388,7 @@ class Run {
   }
 
   /// Returns whether further shifts would hardly narrow the intervals.
-  bool settled() const { return shifts_ > 0 && shifts_scatter_ <= 1; }
+  bool settled() const { return shifts_ > 0 && shifts_scatter_ <= 1 && half_width(study_.steps) <= narrow; }
 
   /// Joins the shifts made so far.
   void join() {
