@@ -153,8 +153,10 @@ Eigen::MatrixXd reflected_bootstrap(const Eigen::MatrixXd& points, const std::ve
   const Eigen::MatrixXd measured = unit.cwiseInverse().asDiagonal() * was.covariance * unit.cwiseInverse().asDiagonal();
   const Eigen::MatrixXd white = root(measured, true) * unit.cwiseInverse().asDiagonal();
   const markov::SymmetricEigen split = markov::symmetric_eigen(white * is.covariance * white.transpose());
+  // The inverse of a covariance of d numbers is too large, by as much as d - 1 degrees of freedom are fewer.
+  const double unbiased = 1 - static_cast<double>(points.cols() - 1) / is.known;
   Eigen::VectorXd of = split.values;
-  for (double& value : of) value = 1 / std::sqrt(std::max(value, least_kept));
+  for (double& value : of) value = std::sqrt(unbiased / std::max(value, least_kept));
   const Eigen::MatrixXd turn =
       unit.asDiagonal() * root(measured, false) * split.vectors * of.asDiagonal() * split.vectors.transpose() * white;
   for (const std::size_t i : is.near) {

@@ -37,10 +37,10 @@ class SmoothSample {
 /// Draws the sample that a distribution may be known by instead, given these points of it. A bootstrap scatters around
 /// the points as they scatter around the distribution; what the distribution may be lies on the other side of them.
 /// The points are moved and stretched so that their mean and, in units of their own, their covariance differ from what
-/// they are as the bootstrap's do, the other way round. Of normal points this is the posterior of their covariance up
-/// to the order 1 / n (Gelman et al., Bayesian Data Analysis, 3rd ed., section 3.6). Where they are too few for a
-/// covariance, it is the bootstrap. Points far from all others are drawn as they are, as often as the bootstrap has
-/// them.
+/// they are as the bootstrap's do, the other way round. Of normal points the variance in any one
+/// direction then has its posterior up to the order 1 / n (Gelman et al., Bayesian Data Analysis, 3rd ed.,
+/// section 3.6). Where they are too few for a covariance, it is the bootstrap. Points far from all others are drawn as
+/// they are, as often as the bootstrap has them.
 /// @param points, group  as SmoothSample's  @param uniforms  [n] in (0, 1): whose place it takes, within its group
 /// @return [n x d]
 Eigen::MatrixXd reflected_bootstrap(const Eigen::MatrixXd& points, const std::vector<int>& group,
