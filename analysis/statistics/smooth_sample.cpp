@@ -39,11 +39,17 @@ std::vector<char> far_points(const Eigen::MatrixXd& points) {
   return far;
 }
 
-// The points that are not far off, the means of their groups, and how they deviate from these.
+// The points that are not far off, the means of their groups, and how they deviate from these. Coordinates have units
+// of their own: their spreads are compared in those of the sample.
 struct Scatter {
   std::vector<std::size_t> near;
-  Eigen::MatrixXd mean, covariance;  // [groups x d], [d x d]
-  double known = 0;                  // degrees of freedom of the covariance
+  Eigen::MatrixXd mean;        // [groups x d]
+  Eigen::VectorXd unit;        // [d]
+  Eigen::MatrixXd covariance;  // [d x d] in those units
+  double known = 0;            // degrees of freedom of the covariance
+
+  // Turns deviations into those of unit covariance.
+  Eigen::MatrixXd white() const { return root(covariance, true) * unit.cwiseInverse().asDiagonal(); }
 };
 
 Scatter scatter_of(const Eigen::MatrixXd& points, const std::vector<int>& group, const std::vector<char>& far) {
@@ -65,13 +71,10 @@ Scatter scatter_of(const Eigen::MatrixXd& points, const std::vector<int>& group,
   }
   s.known = static_cast<double>(s.near.size()) - (count.array() > 0).cast<double>().sum();
   s.covariance /= std::max(1.0, s.known);
+  s.unit = s.covariance.diagonal().cwiseSqrt();
+  for (double& one : s.unit) one = one > 0 ? one : 1;
+  s.covariance = s.unit.cwiseInverse().asDiagonal() * s.covariance * s.unit.cwiseInverse().asDiagonal();
   return s;
-}
-
-Eigen::VectorXd units_of(const Eigen::MatrixXd& covariance) {
-  Eigen::VectorXd unit = covariance.diagonal().cwiseSqrt();
-  for (double& one : unit) one = one > 0 ? one : 1;
-  return unit;
 }
 
 // Returns the width of the kernel, in units of the sample's spread, under which points are likeliest from all others
@@ -106,19 +109,15 @@ SmoothSample::SmoothSample(const Eigen::MatrixXd& points, std::vector<int> group
   const Scatter scatter = scatter_of(points_, group_, far_);
   near_ = scatter.near;
   mean_ = scatter.mean;
-  const Eigen::MatrixXd& covariance = scatter.covariance;
-  // Coordinates have units of their own: their spreads are compared in those of the sample.
-  const Eigen::VectorXd unit = units_of(covariance);
-  const Eigen::MatrixXd measured = unit.cwiseInverse().asDiagonal() * covariance * unit.cwiseInverse().asDiagonal();
-  Eigen::MatrixXd left = measured;
-  left.diagonal() -= removed.cwiseQuotient(unit.cwiseAbs2());
-  const Eigen::MatrixXd white = root(measured, true) * unit.cwiseInverse().asDiagonal();
+  Eigen::MatrixXd left = scatter.covariance;
+  left.diagonal() -= removed.cwiseQuotient(scatter.unit.cwiseAbs2());
+  const Eigen::MatrixXd white = scatter.white();
   Eigen::MatrixXd deviations(static_cast<Eigen::Index>(near_.size()), d);
   for (std::size_t k = 0; k < near_.size(); ++k)
     deviations.row(static_cast<Eigen::Index>(k)) =
         (points_.row(static_cast<Eigen::Index>(near_[k])) - mean_.row(group_[near_[k]])) * white.transpose();
   const double width = likeliest_width(deviations);
-  const Eigen::MatrixXd spread = unit.asDiagonal() * root(left, false);
+  const Eigen::MatrixXd spread = scatter.unit.asDiagonal() * root(left, false);
   turn_ = std::sqrt(1 - width * width) * spread * white;
   kernel_ = width * spread;
 }
@@ -149,16 +148,14 @@ Eigen::MatrixXd reflected_bootstrap(const Eigen::MatrixXd& points, const std::ve
   }
   const Scatter was = scatter_of(points, group, far), is = scatter_of(again, group, again_far);
   if (!(std::min(was.known, is.known) > static_cast<double>(points.cols()))) return again;
-  const Eigen::VectorXd unit = units_of(was.covariance);
-  const Eigen::MatrixXd measured = unit.cwiseInverse().asDiagonal() * was.covariance * unit.cwiseInverse().asDiagonal();
-  const Eigen::MatrixXd white = root(measured, true) * unit.cwiseInverse().asDiagonal();
-  const markov::SymmetricEigen split = markov::symmetric_eigen(white * is.covariance * white.transpose());
+  const Eigen::MatrixXd white = was.white(), back = was.unit.asDiagonal() * root(was.covariance, false),
+                        of_unit = white * is.unit.asDiagonal();
+  const markov::SymmetricEigen split = markov::symmetric_eigen(of_unit * is.covariance * of_unit.transpose());
   // The inverse of a covariance of d numbers is too large, by as much as d - 1 degrees of freedom are fewer.
   const double unbiased = 1 - static_cast<double>(points.cols() - 1) / is.known;
   Eigen::VectorXd of = split.values;
   for (double& value : of) value = std::sqrt(unbiased / std::max(value, least_kept));
-  const Eigen::MatrixXd turn =
-      unit.asDiagonal() * root(measured, false) * split.vectors * of.asDiagonal() * split.vectors.transpose() * white;
+  const Eigen::MatrixXd turn = back * split.vectors * of.asDiagonal() * split.vectors.transpose() * white;
   for (const std::size_t i : is.near) {
     const Eigen::RowVectorXd mean = was.mean.row(group[i]);
     const auto row = static_cast<Eigen::Index>(i);

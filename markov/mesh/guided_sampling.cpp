@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <boost/math/special_functions/gamma.hpp>
 #include <cmath>
 #include <numeric>
 #include <stdexcept>
@@ -18,6 +19,7 @@ namespace {
 
 constexpr std::uint64_t burn_in_stream = 0x3000, offsets_stream = 0x4000, choices_stream = 0x5000;
 constexpr double defensive = 0.05;   // share of the guide's mean that every score gets
+constexpr double unsampled = 1e-4;   // of the failures: what scores beyond their reach may stand for
 constexpr double about_equal = 0.2;  // sd over mean of the chances to fail after a window: it adds 4 % to the variance
 
 class Guided {
@@ -246,6 +248,13 @@ int reaching_window(const Mesh& mesh, std::span<const double> settled, int most)
     if (even) return window;
   }
   return most;
+}
+
+double sampled_reach(int scores, int window, double rate) {
+  const double beyond = std::clamp(unsampled * rate / window, 1e-300, 0.5);
+  const double reach = std::sqrt(2 * boost::math::gamma_q_inv(0.5 * scores, beyond));
+  const GuidedOptions most;  // whose lattice is moved by half a spacing on every axis
+  return std::min(most.score_reach, reach + 0.5 * most.score_spacing * std::sqrt(static_cast<double>(scores)));
 }
 
 }  // namespace metastable::markov

@@ -43,4 +43,9 @@ GuidedRate guided_failure_rate(const BatchMap& map, const Mesh& mesh, std::span<
 /// @param settled  MeshPassage::distribution; empty: not known
 int reaching_window(const Mesh& mesh, std::span<const double> settled, int most);
 
+/// Returns the score_reach that samples need to find such a failure rate, at most the default one: scores beyond are so
+/// few that they bear on no rate as large as this one, nor on a larger one, and hardly on one ten times smaller.
+/// @param scores  >= 1  @param window  >= 1  @param rate  a step, > 0
+double sampled_reach(int scores, int window, double rate);
+
 }  // namespace metastable::markov

@@ -3,8 +3,6 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <boost/math/distributions/students_t.hpp>
-#include <boost/math/special_functions/gamma.hpp>
 #include <cmath>
 #include <limits>
 #include <memory>
@@ -22,6 +20,7 @@
 #include "markov/mesh/study_orbit.h"
 #include "markov/normal_95.h"
 #include "markov/parallel.h"
+#include "markov/size_extrapolation.h"
 #include "markov/transition_rows/score_lattice.h"
 #include "markov/work_left.h"
 
@@ -31,13 +30,11 @@ namespace {
 constexpr double disagrees = 1.7;      // joint half-widths: 99.9 % of the normal
 constexpr double sampled_windows = 3;  // of guided samples: within one, failures are still few
 constexpr int longest_window = 200;    // of guided samples [steps]
-constexpr double unsampled = 1e-4;     // of the failures: what scores beyond the reach of guided samples may stand for
 constexpr double least_even_share =
     0.5;                              // effective samples a sample: below, their own scatter tells too small an error
 constexpr double sampled_from = 100;  // expected steps above which guided samples settle before they fail
 constexpr double widest = 4;          // of the interval: its end over its beginning, beyond which it is no answer
 constexpr double most_blind = 0.1;    // of the failures, in blind spots: beyond, bands are stepped over
-constexpr double least = 0.25;        // of what the extrapolation's last order moved: its error
 constexpr double row_error = 5e-4;    // what reading rows off curves may leave, about so much
 constexpr std::size_t fewest_shifts = 3;
 constexpr double narrow = 0.01;  // half-width of what a few shifts may say: the parts of a wider one are told by many
@@ -65,50 +62,6 @@ double coarsest_spacing(const BatchMap& map, const MeshStudyOptions& options) {
   return options.spacing > 0 ? options.spacing : coarsest(map.dimension);
 }
 
-/// Returns the value at 0 of the polynomial in h^2 through the logs of sizes first .. last - 1, h^2 halving from each
-/// to the next.
-double at_zero(const std::vector<double>& by_size, std::size_t first, std::size_t last) {
-  std::vector<double> row(by_size.begin() + static_cast<std::ptrdiff_t>(first),
-                          by_size.begin() + static_cast<std::ptrdiff_t>(last));
-  for (double factor = 2; row.size() > 1; factor *= 2) {
-    for (std::size_t i = 0; i + 1 < row.size(); ++i) row[i] = (factor * row[i + 1] - row[i]) / (factor - 1);
-    row.pop_back();
-  }
-  return row.front();
-}
-
-struct Extrapolated {
-  double log_value = 0, shift_error = 0, discretization_error = 0;
-};
-
-/// Extrapolates `logs[shift][size]`; takes `safety` times the discretization error that the sizes show.
-Extrapolated extrapolate(std::span<const std::vector<double>> logs, double safety) {
-  const auto n = static_cast<double>(logs.size());
-  const std::size_t sizes = logs.front().size();
-  std::vector<double> values, mean(sizes, 0.0);
-  Extrapolated e;
-  for (const auto& by_size : logs) {
-    values.push_back(at_zero(by_size, 0, sizes));
-    e.log_value += values.back() / n;
-    for (std::size_t i = 0; i < sizes; ++i) mean[i] += by_size[i] / n;
-  }
-  double spread = 0;
-  for (const double value : values) spread += (value - e.log_value) * (value - e.log_value);
-  const double quantile = boost::math::quantile(boost::math::students_t(n - 1), 0.975);
-  e.shift_error = quantile * std::sqrt(spread / (n - 1) / n);
-  // What the last order of the extrapolation moved is the error of the one before; its own is smaller by as much as
-  // that order moved less than the ones before it. No more than to a quarter, and with four times what this says.
-  const double before = std::abs(at_zero(mean, 1, sizes) - mean.back());
-  e.discretization_error = std::abs(e.log_value - at_zero(mean, 1, sizes));
-  if (before > 0) e.discretization_error *= std::clamp(4 * e.discretization_error / before, least, 1.0);
-  // Where a fourth size was asked for the square is far off; the error is what the extrapolation by three last moved.
-  if (sizes > 3)
-    e.discretization_error = std::max(e.discretization_error,
-                                      std::abs(at_zero(mean, sizes - 3, sizes) - at_zero(mean, sizes - 4, sizes - 1)));
-  e.discretization_error = std::hypot(safety * e.discretization_error, row_error);
-  return e;
-}
-
 double half_width(const MeshEstimate& e) { return 0.5 * std::log(e.upper / e.lower); }
 
 MeshEstimate around(double value, double relative) {
@@ -118,15 +71,6 @@ MeshEstimate around(double value, double relative) {
 /// Returns the simulations of a study: of about `simulated_steps` steps.
 SimulationOptions walking(const MeshStudyOptions& options) {
   return {.seed = options.seed, .threads = options.threads, .most_steps = options.simulated_steps};
-}
-
-/// Returns the scores that guided samples must reach: beyond are so few that they bear on no rate as large as this one,
-/// nor on a larger one, and hardly on one ten times smaller.
-double sampled_reach(int scores, int window, double rate) {
-  const double beyond = std::clamp(unsampled * rate / window, 1e-300, 0.5);
-  const double reach = std::sqrt(2 * boost::math::gamma_q_inv(0.5 * scores, beyond));
-  const GuidedOptions most;  // whose lattice is moved by half a spacing on every axis
-  return std::min(most.score_reach, reach + 0.5 * most.score_spacing * std::sqrt(static_cast<double>(scores)));
 }
 
 /// Makes one study.
@@ -397,16 +341,20 @@ class Run {
         study_.bracket = std::max(study_.bracket, brackets_[shift][size]);
     // What an extrapolation says of its own error grows with what it left out: as the square of the spacing.
     const double coarser = std::max(1.0, study_.sizes.front().spacing / coarsest(map_.dimension));
-    const Extrapolated by_steps = extrapolate(std::span(steps_).first(shifts_), coarser * coarser),
-                       by_rate = extrapolate(std::span(rates_).first(shifts_), coarser * coarser);
+    const auto extrapolated = [&](const std::vector<std::vector<double>>& logs) {
+      Extrapolated e = extrapolate_sizes(std::span(logs).first(shifts_));
+      e.discretization_error = std::hypot(coarser * coarser * e.discretization_error, row_error);
+      return e;
+    };
+    const Extrapolated by_steps = extrapolated(steps_), by_rate = extrapolated(rates_);
     shifts_scatter_ = std::max(by_steps.shift_error / (by_steps.discretization_error + study_.bracket),
                                by_rate.shift_error / (by_rate.discretization_error + study_.bracket));
     study_.shift_error = by_steps.shift_error;
     study_.discretization_error = by_steps.discretization_error;
-    study_.steps = around(std::exp(by_steps.log_value),
+    study_.steps = around(std::exp(by_steps.value),
                           std::hypot(by_steps.shift_error, by_steps.discretization_error) + study_.bracket);
-    study_.failure_rate = around(std::exp(by_rate.log_value),
-                                 std::hypot(by_rate.shift_error, by_rate.discretization_error) + study_.bracket);
+    study_.failure_rate =
+        around(std::exp(by_rate.value), std::hypot(by_rate.shift_error, by_rate.discretization_error) + study_.bracket);
   }
 
   /// Widens the intervals by what the mesh may not have seen, or says that it is too much.

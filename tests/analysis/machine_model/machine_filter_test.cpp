@@ -156,45 +156,58 @@ TEST(MachineFilter, ScoresOfColumnsThatBendTogetherAreNormal) {
 }
 
 // Two columns that one value w moves along a curve, where w scatters from trial to trial as widely as from step to
-// step: x' = exp(w) shows it, so that the likelihood is that of normals that are equally correlated within a trial.
+// step, and above an edge of w the machine fails: x' = exp(w) shows it, so that each w is normal given those before.
 TEST(MachineFilter, ASpreadBetweenTrialsWhereTheMapBendsHasItsLikelihood) {
   constexpr double sd = 0.3, between = 0.4, error = 0.01;
-  constexpr std::size_t trials = 12, rows = 9;
-  Machine machine = linear_machine(error);
-  machine.states = {"x", "y"};
-  machine.parameters = {{"b", 0, 0.1}, {"s", sd, 0.05, 0.01, 2}};
-  machine.effects.clear();
-  machine.observe = {{"x", error, 0}, {"y", error, 0}};
-  machine.step = [](const MachineBatch& batch) {
-    for (std::size_t i = 0; i < batch.rows; ++i) {
-      const double w = batch.value(0, i) + batch.value(1, i) * batch.scores[i];
-      batch.next[2 * i] = std::exp(w);
-      batch.next[2 * i + 1] = w + 0.4 * w * w;
+  for (const double edge : {100.0, 0.5}) {
+    Machine machine = linear_machine(error);
+    machine.states = {"x", "y"};
+    machine.parameters = {{"b", 0, 0.1}, {"s", sd, 0.05, 0.01, 2}};
+    machine.effects.clear();
+    machine.observe = {{"x", error, 0}, {"y", error, 0}};
+    machine.step = [edge](const MachineBatch& batch) {
+      for (std::size_t i = 0; i < batch.rows; ++i) {
+        const double w = batch.value(0, i) + batch.value(1, i) * batch.scores[i];
+        batch.next[2 * i] = std::exp(w);
+        batch.next[2 * i + 1] = w + 0.4 * w * w;
+        batch.failed[i] = w > edge;
+      }
+    };
+    std::mt19937_64 generator(8);
+    std::normal_distribution<double> normal;
+    MachineRuns runs;
+    double exact = 0;
+    std::size_t failed = 0;
+    for (std::size_t t = 0; t < 12; ++t) {
+      MachineTrial& trial = runs.trials.emplace_back();
+      trial.rows.push_back({.seen = {1, 0}});
+      trial.outcome = MachineOutcome::stopped;
+      const double offset = between * normal(generator);
+      double sum = 0;
+      for (int k = 0; k < 8; ++k) {
+        const double w = offset + sd * normal(generator), off = error * normal(generator);
+        const double known = 1 / (1 / (between * between) + k / (sd * sd));  // variance of the offset, given k of w
+        const double mean = known * sum / (sd * sd), spread = std::sqrt(known + sd * sd);
+        if (w > edge) {
+          trial.outcome = MachineOutcome::failed;
+          exact += std::log(dynamics::normal_cdf((mean - edge) / spread));
+          ++failed;
+          break;
+        }
+        trial.rows.push_back({.seen = {std::exp(w), w + 0.4 * w * w + off}});
+        const double across = error * std::hypot(1, (1 + 0.8 * w) * std::exp(-w));       // of y, given x
+        exact += std::log(dynamics::normal_density((w - mean) / spread) / spread) - w +  // of x: dw / dx
+                 std::log(dynamics::normal_density(off / across) / across);
+        sum += w;
+      }
     }
-  };
-  std::mt19937_64 generator(8);
-  std::normal_distribution<double> normal;
-  MachineRuns runs;
-  double exact = 0;
-  for (std::size_t t = 0; t < trials; ++t) {
-    runs.trials.emplace_back().rows.push_back({.seen = {1, 0}});
-    runs.trials.back().outcome = MachineOutcome::stopped;
-    const double offset = between * normal(generator);
-    double sum = 0, squares = 0;
-    for (std::size_t k = 1; k < rows; ++k) {
-      const double w = offset + sd * normal(generator), off = error * normal(generator);
-      runs.trials.back().rows.push_back({.seen = {std::exp(w), w + 0.4 * w * w + off}});
-      sum += w, squares += w * w;
-      const double spread = error * std::hypot(1, (1 + 0.8 * w) * std::exp(-w));  // of y, given x
-      exact += std::log(dynamics::normal_density(off / spread) / spread) - w;     // of x: dw / dx
-    }
-    constexpr double n = rows - 1, total = sd * sd + n * between * between;
-    exact -= 0.5 * ((squares - between * between / total * sum * sum) / (sd * sd) + std::log(total / (sd * sd))) +
-             n * std::log(sd * std::sqrt(2 * std::numbers::pi));
+    EXPECT_EQ(failed > 2, edge < 1);
+    MachineHypothesis h = nominal_of(machine);
+    h.spreads = {{0, between}};
+    const ScorePlan plan = score_plan(machine, runs, nominal_of(machine));
+    const std::vector<Event> events = machine_events(machine, runs, plan);
+    EXPECT_NEAR(follow_machine(machine, runs, plan, events, h).total(), exact, 1) << edge;
   }
-  MachineHypothesis h = nominal_of(machine);
-  h.spreads = {{0, between}};
-  EXPECT_NEAR(followed(machine, runs, h).total(), exact, 1);
 }
 
 // A machine that fails below an edge: x' = x / 2 + 1 + z / 2 where z > edge.
