@@ -121,6 +121,8 @@ ScorePlan planned(const Told& told, bool failed) {
 
 ScorePlan score_plan(const Machine& machine, const MachineRuns& runs, const MachineHypothesis& nominal) {
   MachineStepper stepper(machine, runs, nominal);
+  if (stepper.size() != stepper.states())
+    throw std::invalid_argument("score_plan: a hypothesis without spreads and memory is expected");
   const auto scores = static_cast<std::size_t>(machine.scores);
   std::vector<TransitionPlace> places;
   const std::vector<Eigen::VectorXd> states = measured_states(machine, runs, places);

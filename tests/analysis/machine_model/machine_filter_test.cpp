@@ -10,6 +10,7 @@
 #include <cmath>
 #include <numbers>
 #include <random>
+#include <stdexcept>
 #include <vector>
 
 #include "dynamics/numerics/truncated_normal.h"
@@ -205,6 +206,7 @@ TEST(MachineFilter, ASpreadBetweenTrialsWhereTheMapBendsHasItsLikelihood) {
     MachineHypothesis h = nominal_of(machine);
     h.spreads = {{0, between}};
     const ScorePlan plan = score_plan(machine, runs, nominal_of(machine));
+    EXPECT_THROW(score_plan(machine, runs, h), std::invalid_argument);
     const std::vector<Event> events = machine_events(machine, runs, plan);
     EXPECT_NEAR(follow_machine(machine, runs, plan, events, h).total(), exact, 1) << edge;
   }
