@@ -53,13 +53,19 @@ StepsBeforeFailure steps_before_failure(const TransitionModel& model, const std:
   return steps;
 }
 
-// Lists the hypotheses that say what the machine's expected steps are: the likeliest with its rivals, by probability.
-std::vector<WeighedFit> telling(const std::vector<const RankedCause*>& ordered, const Diagnosis& d) {
+// Lists the hypotheses that say what the machine's expected steps are, by probability: the likeliest with its rivals,
+// and without a gap the recalibrated model before them; none where that stands alone.
+std::vector<WeighedFit> telling(const std::vector<const RankedCause*>& ordered, const Fit& recalibrated,
+                                const Fit& cause, const Diagnosis& d) {
   std::vector<WeighedFit> fits;
-  for (std::size_t i = 0; i < ordered.size() && fits.size() < most_telling; ++i)
-    if (ordered[i]->fitted() &&
-        d.causes.ranked[i].probability >= d.rules.least_of_first * d.causes.ranked.front().probability)
+  if (is_gap(d.verdict) && &cause == &recalibrated) return fits;
+  if (!is_gap(d.verdict)) fits.push_back({&recalibrated, d.causes.p_no_gap + d.causes.p_recalibrate});
+  for (std::size_t i = 0; i < ordered.size() && fits.size() < most_telling; ++i) {
+    const double first = fits.empty() ? d.causes.ranked.front().probability : fits.front().weight;
+    if (ordered[i]->fitted() && d.causes.ranked[i].probability >= d.rules.least_of_first * first)
       fits.push_back({&ordered[i]->fit, d.causes.ranked[i].probability});
+  }
+  if (fits.size() == 1 && fits.front().fit == &recalibrated) fits.clear();
   return fits;
 }
 
@@ -437,10 +443,8 @@ Diagnosis answer(const TransitionModel& model, const Fitted& fitted, const std::
   d.shrinkage.steps = steps_before_failure(model, fitted.given.nuisance, fitted.recalibrated, cause, options.seed);
   if (const auto [at_risk, rests] = model.rests(); at_risk > 0 && !d.shrinkage.measures.empty())
     d.shrinkage.measures.push_back(rest_shrinkage(at_risk, rests, d.shrinkage.steps));
-  add_machine_steps(
-      d, model, {&fitted.recalibrated, 1},
-      is_gap(d.verdict) && &cause != &fitted.recalibrated ? telling(ordered, d) : std::vector<WeighedFit>{}, elsewhere,
-      options, [&] { progress(0.9, "steps before failure"); });
+  add_machine_steps(d, model, {&fitted.recalibrated, 1}, telling(ordered, fitted.recalibrated, cause, d), elsewhere,
+                    options, [&] { progress(0.9, "steps before failure"); });
   d.shrinkage.profile = collision_profile(model, fitted.given.nuisance, cause, options.seed);
   if (is_gap(d.verdict)) d.shrinkage.drawn_with_effect = model.simulate(cause.nuisance, cause.terms, options.seed);
   progress(0.93, "what could not be seen");

@@ -208,7 +208,7 @@ void add_machine_steps(Diagnosis& d, const TransitionModel& model, const Weighed
   const std::vector<double> of_plain = draw(model, plain, fits.empty() ? draws_of_machine : draws_of_recalibrated);
   const std::vector<double> of_effects = fits.empty() ? of_plain : draw(model, fits, draws_of_machine);
   s.recalibrated_90 = interval_of_draws(of_plain);
-  s.with_effect_90 = interval_of_draws(of_effects);
+  s.with_effect_90 = is_gap(d.verdict) ? interval_of_draws(of_effects) : s.recalibrated_90;
   const auto [at_risk, rests] = model.rests();
   const ModelError error = model_error(d);
   const auto add = [&](const std::string& where, const std::vector<double>& there) {

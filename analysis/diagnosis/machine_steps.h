@@ -60,7 +60,7 @@ Estimate bounded_by_count(const Estimate& joined, const StepsBeforeFailure& coun
 
 /// Fills in the intervals of the models' expected steps, and the machine's own; none where neither the models nor the
 /// count bound them.
-/// @param fits  the recalibrated model, then those of the hypotheses with their probabilities (none: that model alone)
+/// @param fits  the models that may be the machine, by their probabilities (none: the recalibrated model alone)
 /// @param d  with its verdict, its held-out measures and the steps observed and expected
 void add_machine_steps(Diagnosis& d, const TransitionModel& model, const WeighedFit& recalibrated,
                        const std::vector<WeighedFit>& fits, const Elsewhere& elsewhere, const DiagnosisOptions& options,

@@ -10,6 +10,7 @@
 #include <string>
 
 #include "markov/chain/period.h"
+#include "markov/passage/slow_modes.h"
 #include "markov/passage/survival_after.h"
 
 namespace metastable::markov {
@@ -77,6 +78,11 @@ class Settled {
       rest += std::abs(survivors[i] - settled * quasi_.distribution[i]) * quasi_.survival_weight[i];
     return rest / settled;
   }
+  /// Says whether what is not settled may be followed by its slow modes.
+  bool has_slow_modes(const Chain& chain) const {
+    const std::vector<std::uint8_t> can_rest = classify(chain).can_rest;
+    return period_.period == 1 && std::ranges::all_of(can_rest, [](std::uint8_t can) { return can != 0; });
+  }
   /// Returns the unsettled share that moves the survival by no more than settled_survival; 0 where none is known.
   double harmless() const { return settled_survival / spread_; }
   /// Says whether survivors look so.
@@ -129,10 +135,6 @@ double steps_foreseen(double now, double half_way, double share, double harmless
   return fading > 0 ? now + std::log(share / harmless) / fading : std::numeric_limits<double>::infinity();
 }
 
-[[noreturn]] void refuse(const std::string& what) {
-  throw ConvergenceError("survival", std::numeric_limits<double>::quiet_NaN(), "survivors " + what);
-}
-
 /// Returns the probability of never coming to rest.
 double never(const Chain& chain, std::span<const double> start, const Heard& heard) {
   const Reachability reach = classify(chain);
@@ -150,6 +152,43 @@ double never(const Chain& chain, std::span<const double> start, const Heard& hea
   return never;
 }
 
+/// Follows survivors until they have settled, until `last`, or until that many steps are foreseen that modes tell more.
+/// Returns the probability of surviving n = 0, 1, 2 ... steps.
+std::vector<double> follow(Survivors& survivors, const Settled* settled, double last, double anyhow,
+                           const Heard& heard) {
+  const double most = std::max(most_followed, anyhow);
+  std::vector<double> at{survivors.survival()};
+  double half_way = 0;
+  while (static_cast<double>(at.size()) <= last && survivors.any() &&
+         !(settled && settled->reached(survivors.shares()))) {
+    if (heard) heard();
+    const auto now = static_cast<double>(at.size());
+    if (now > most) break;
+    if (settled && now == std::floor(anyhow / 2)) half_way = settled->unsettled(survivors.shares());
+    if (settled && now == anyhow &&
+        steps_foreseen(now, half_way, settled->unsettled(survivors.shares()), settled->harmless()) > most)
+      break;
+    survivors.step();
+    at.push_back(survivors.survival());
+  }
+  return at;
+}
+
+/// Returns the probabilities that survivors survive so many more steps.
+std::vector<double> survive_more(const Chain& chain, const QuasiStationary& quasi, const Settled& settled,
+                                 const std::vector<double>& survivors, const std::vector<double>& more,
+                                 const Heard& heard) {
+  if (settled.reached(survivors)) {
+    std::vector<double> told;
+    for (const double m : more) told.push_back(std::exp(settled.log_survival(survivors, m)));
+    return told;
+  }
+  if (!settled.has_slow_modes(chain))
+    throw ConvergenceError("survival", std::numeric_limits<double>::quiet_NaN(),
+                           "survivors have not settled after as many steps as are followed");
+  return survival_by_slow_modes(chain, quasi, survivors, more, widest_bound, heard);
+}
+
 }  // namespace
 
 std::vector<double> bounded_survival_after(const Chain& chain, std::span<const double> start,
@@ -158,40 +197,29 @@ std::vector<double> bounded_survival_after(const Chain& chain, std::span<const d
   check_survival(chain, start, steps);
   const auto entries = static_cast<double>(chain.entries() + chain.size());
   const double anyhow = std::max(least_followed, std::floor(followed_anyhow / entries));
-  const double most = std::max(most_followed, anyhow);
   double last = 0;
   for (const double n : steps)
     if (std::isfinite(n)) last = std::max(last, n);
   std::unique_ptr<Settled> settled;
   if (last > anyhow) settled = std::make_unique<Settled>(chain, quasi());
   Survivors survivors(chain, start);
-  std::vector<double> at{survivors.survival()};
-  double half_way = 0;
-  while (static_cast<double>(at.size()) <= last && survivors.any() &&
-         !(settled && settled->reached(survivors.shares()))) {
-    if (heard) heard();
-    const auto now = static_cast<double>(at.size());
-    if (now > most) refuse(fmt::format("have not settled after {} steps", most));
-    if (settled && now == std::floor(anyhow / 2)) half_way = settled->unsettled(survivors.shares());
-    if (settled && now == anyhow) {
-      const double share = settled->unsettled(survivors.shares());
-      const double foreseen = steps_foreseen(now, half_way, share, settled->harmless());
-      if (foreseen > most) refuse(fmt::format("settle after {:.2g} steps, and {} are followed", foreseen, most));
-    }
-    survivors.step();
-    at.push_back(survivors.survival());
-  }
+  const std::vector<double> at = follow(survivors, settled.get(), last, anyhow, heard);
+  const auto followed = static_cast<double>(at.size() - 1);
+  std::vector<double> more;
+  for (const double n : steps)
+    if (std::isfinite(n) && n > followed) more.push_back(n - followed);
+  std::vector<double> beyond(more.size(), 0.0);
+  if (!more.empty() && survivors.any())
+    beyond = survive_more(chain, quasi(), *settled, survivors.shares(), more, heard);
+  auto next = beyond.begin();
   std::vector<double> told;
   for (const double n : steps) {
-    const double beyond = n - static_cast<double>(at.size() - 1);
     if (std::isinf(n))
       told.push_back(never(chain, start, heard));
-    else if (beyond <= 0)
+    else if (n <= followed)
       told.push_back(at[static_cast<std::size_t>(n)]);
     else
-      told.push_back(survivors.any() ? static_cast<double>(std::exp(survivors.log_survival() +
-                                                                    settled->log_survival(survivors.shares(), beyond)))
-                                     : 0);
+      told.push_back(survivors.survival() * *next++);
   }
   return told;
 }

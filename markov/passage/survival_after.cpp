@@ -6,10 +6,11 @@
 #include <algorithm>
 #include <cmath>
 #include <numeric>
+#include <optional>
 #include <stdexcept>
 
 #include "markov/chain/solver.h"
-#include "markov/passage/first_passage.h"
+#include "markov/passage/bounded_survival.h"
 #include "markov/passage/last_steps.h"
 #include "markov/passage/quasi_stationary.h"
 
@@ -18,9 +19,7 @@ namespace {
 
 using Matrix = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
 
-constexpr double followed_steps = 4096;      // that are always followed one by one
-constexpr double followed_products = 2e8;    // entries times steps that are on more states than can be doubled
-constexpr std::size_t doubled_states = 512;  // of a chain that is doubled
+constexpr double followed_steps = 4096;  // that are always followed one by one
 constexpr double start_tolerance = 1e-9;
 
 double sum_of(std::span<const double> v) { return std::accumulate(v.begin(), v.end(), 0.0); }
@@ -106,9 +105,9 @@ std::vector<double> doubled(const Chain& chain, std::span<const double> start, s
 }
 
 /// Finds the probability of never coming to rest.
-double never(const Chain& chain, std::span<const double> start, int threads) {
+double never(const Chain& chain, std::span<const double> start) {
   const Reachability reach = classify(chain);
-  const PassageTo passage = passage_by_elimination(chain, std::vector<std::uint8_t>(chain.size(), 0), threads);
+  const PassageTo passage = passage_by_elimination(chain, std::vector<std::uint8_t>(chain.size(), 0));
   double never = 0;
   for (std::size_t i = 0; i < start.size(); ++i)
     if (!reach.must_rest[i]) never += start[i] * std::max(0.0, 1 - passage.fail[i]);
@@ -130,33 +129,30 @@ void check_survival(const Chain& chain, std::span<const double> start, std::span
       throw std::invalid_argument(fmt::format("steps: {} is no whole number from 0 on, nor infinity", n));
 }
 
-std::vector<double> survival_after(const Chain& chain, std::span<const double> start, std::span<const double> steps,
-                                   int threads) {
+std::vector<double> survival_after(const Chain& chain, std::span<const double> start, std::span<const double> steps) {
   check_survival(chain, start, steps);
-  const double entries = static_cast<double>(chain.entries() + chain.size());
-  const bool doubles = chain.size() <= doubled_states;
-  const double most = doubles ? followed_steps : std::max(followed_steps, std::floor(followed_products / entries));
+  if (chain.size() > doubled_states) {
+    std::optional<QuasiStationary> found;
+    const auto quasi = [&]() -> const QuasiStationary& {
+      if (!found) found = quasi_stationary(ChainSolver(chain));
+      return *found;
+    };
+    return bounded_survival_after(chain, start, steps, quasi);
+  }
   std::vector<double> far, at(steps.size());
   double last = 0;
   for (const double n : steps)
-    if (n <= most) last = std::max(last, n);
+    if (n <= followed_steps) last = std::max(last, n);
   const std::vector<double> near = followed(chain, start, static_cast<std::size_t>(last));
   for (const double n : steps)
-    if (n > most && std::isfinite(n)) far.push_back(n);
-  std::vector<double> beyond;
-  if (!far.empty() && doubles) {
-    beyond = doubled(chain, start, far);
-  } else if (!far.empty()) {
-    const ChainSolver solver(chain, threads);
-    const Survival survival(solver, quasi_stationary(solver), {{start.begin(), start.end()}, 0});
-    for (const double n : far) beyond.push_back(survival.at(n + 1));  // there the launch is a step of its own
-  }
+    if (n > followed_steps && std::isfinite(n)) far.push_back(n);
+  const std::vector<double> beyond = far.empty() ? far : doubled(chain, start, far);
   auto next = beyond.begin();
   for (std::size_t q = 0; q < steps.size(); ++q) {
     if (std::isinf(steps[q]))
-      at[q] = never(chain, start, threads);
+      at[q] = never(chain, start);
     else
-      at[q] = steps[q] <= most ? near[static_cast<std::size_t>(steps[q])] : *next++;
+      at[q] = steps[q] <= followed_steps ? near[static_cast<std::size_t>(steps[q])] : *next++;
   }
   return at;
 }

@@ -185,11 +185,11 @@ py::array survival(HeldChain& held, const Number& start, const Number& steps, co
   Call call(progress);
   call.run([&] {
     const markov::Heard heard = listening(call, held, "survival");
-    at = held.iterates()
+    at = held.chain().size() > markov::doubled_states
              ? markov::bounded_survival_after(
                    held.chain(), from, after,
                    [&]() -> const markov::QuasiStationary& { return held.quasi_stationary(heard).quasi; }, heard)
-             : markov::survival_after(held.chain(), from, after, held.threads());
+             : markov::survival_after(held.chain(), from, after);
   });
   return array_of(std::move(at));
 }

@@ -12,6 +12,7 @@
 
 #include "markov/passage/bounded_survival.h"
 #include "markov/passage/first_passage.h"
+#include "markov/passage/slow_modes.h"
 #include "markov/passage/survival_after.h"
 #include "tests/markov/sparse_chains.h"
 #include "tests/message_of.h"
@@ -155,6 +156,20 @@ TEST(BoundedPassageTo, AgreesWithElimination) {
   }
 }
 
+/// Returns the probabilities of surviving rising numbers of steps, by as many products.
+std::vector<double> followed(const Chain& chain, std::vector<double> survivors, const std::vector<double>& steps) {
+  std::vector<double> told;
+  double failed = 0, now = 0;
+  for (const double n : steps) {
+    for (; now < n; ++now) {
+      for (std::size_t i = 0; i < survivors.size(); ++i) failed += survivors[i] * chain.kill(i);
+      survivors = apply_left(chain, survivors);
+    }
+    told.push_back(1 - failed);
+  }
+  return told;
+}
+
 TEST(BoundedSurvival, AgreesWithFollowingEveryStep) {
   for (const std::size_t period : {1U, 4U}) {
     const Chain chain = sparse_chain({states, 1, 0, period, 1e-3, 0});
@@ -163,13 +178,40 @@ TEST(BoundedSurvival, AgreesWithFollowingEveryStep) {
     const std::vector<double> steps{0, 1, 7, 3000, 4000};
     const QuasiStationary quasi = bounded_quasi_stationary(chain).quasi;
     const auto ask = [&]() -> const QuasiStationary& { return quasi; };
-    const std::vector<double> all = survival_after(chain, start, steps);
+    const std::vector<double> all = followed(chain, start, steps);
     std::vector<double> far = steps;
     far.push_back(1e6);  // so that the survivors' settling is asked for
     const std::vector<double> bounded = bounded_survival_after(chain, start, far, ask);
     for (std::size_t q = 0; q < steps.size(); ++q) EXPECT_NEAR(bounded[q] / all[q], 1, 1e-8) << steps[q];
     EXPECT_NEAR(std::log(bounded.back() / bounded[4]) / ((1e6 - 4000) * std::log1p(-quasi.failure_rate)), 1, 1e-6);
   }
+}
+
+// Every state of a block is left, and fails, with the same probability: between the blocks this is a chain of two
+// states.
+TEST(BoundedSurvival, ToldBySlowModesIsThatOfTheBlocks) {
+  constexpr std::size_t block = 257;
+  for (const double leave : {1e-6, 1e-9}) {
+    const Chain chain = blocks_apart(block, leave, 2e-8, 3e-6);
+    const Chain blocks({0, 1, 2}, {1, 0}, {leave, leave}, {2e-8, 3e-6});
+    std::vector<double> start(2 * block, 0);
+    start[3] = 0.25;
+    start[block + 7] = 0.75;
+    const std::vector<double> steps{10, 1e5, 1e6, 1e7, 1e8, 5e8};
+    const std::vector<double> told = survival_after(chain, start, steps),
+                              known = survival_after(blocks, std::vector<double>{0.25, 0.75}, steps);
+    for (std::size_t q = 0; q < steps.size(); ++q) EXPECT_NEAR(told[q] / known[q], 1, 1e-9) << leave << " " << steps[q];
+  }
+}
+
+TEST(BoundedSurvival, GivesNoNumberThatItsModesDoNotProve) {
+  const Chain chain = sparse_chain({240, 60, 1e-6, 1, 1e-6, 0});  // 59 slow modes
+  const QuasiStationary quasi = quasi_stationary(ChainSolver(chain));
+  std::vector<double> survivors(240, 0);
+  survivors[3] = 1;
+  const std::string told = message_of<ConvergenceError>(
+      [&] { survival_by_slow_modes(chain, quasi, survivors, std::vector<double>{1e6}, widest_bound); });
+  EXPECT_NE(told.find("40 slow modes do not tell"), std::string::npos) << told;
 }
 
 TEST(BoundedSurvival, FollowsAllStepsThatAreFollowedInAnyCase) {

@@ -1,0 +1,195 @@
+#include "markov/passage/slow_modes.h"
+
+#include <fmt/format.h>
+
+#include <Eigen/Eigenvalues>
+#include <algorithm>
+#include <cmath>
+#include <complex>
+#include <limits>
+#include <numeric>
+
+#include "markov/chain/generator_solver.h"
+
+namespace metastable::markov {
+namespace {
+
+using Row = std::vector<Extended>;
+using Complex = std::complex<Extended>;
+using Projection = Eigen::Matrix<Extended, Eigen::Dynamic, Eigen::Dynamic>;
+
+constexpr int most_modes = 40;
+constexpr Extended none_left = 1e-17L;  // of survivors: rounding
+constexpr Extended none_proven = std::numeric_limits<Extended>::infinity();
+
+Extended product(std::span<const Extended> a, std::span<const Extended> b) {
+  return std::inner_product(a.begin(), a.end(), b.begin(), Extended{0});
+}
+
+/// Returns log(1 - mu), with the digits of a small mu.
+Complex log_kept(const Complex& mu) {
+  const Extended square = mu.real() * mu.real() + mu.imag() * mu.imag();
+  return {std::log1p(square - 2 * mu.real()) / 2, std::atan2(-mu.imag(), 1 - mu.real())};
+}
+
+/// Holds one mode of what is left: u_j fades as (1 - mu_j)^m. The magnitudes are sums over the states, as they are and
+/// weighted by w.
+struct Mode {
+  Complex log_kept, sum;
+  Extended size = 0, missed = 0, weighted_size = 0, weighted_missed = 0;
+};
+
+/// Survivors without their quasi-stationary part, in a growing Krylov space of (I - Q)^-1.
+class SlowModes {
+ public:
+  SlowModes(const Chain& chain, const QuasiStationary& quasi, std::span<const double> survivors, const Heard& heard)
+      : generator_(generator_of(chain)),
+        distribution_(quasi.distribution.begin(), quasi.distribution.end()),
+        weight_(quasi.survival_weight.begin(), quasi.survival_weight.end()),
+        log_quasi_(std::log1p(-static_cast<Extended>(quasi.failure_rate))),
+        solver_(generator_, heard),
+        left_(survivors.begin(), survivors.end()) {
+    least_weight_ = *std::min_element(weight_.begin(), weight_.end());
+    settled_ = without_quasi(left_);
+    length_ = std::sqrt(product(left_, left_));
+    basis_.push_back(left_);
+    for (Extended& entry : basis_[0]) entry /= length_;
+    if (!(length_ > none_left)) basis_.clear();
+  }
+
+  /// Adds a vector to the space; false where there is none to add.
+  bool grow() {
+    const auto k = static_cast<Eigen::Index>(basis_.size());
+    if (k == 0 || ended_) return false;
+    Row next = solver_.solve_left(basis_.back());
+    without_quasi(next);
+    hessenberg_.conservativeResizeLike(Projection::Zero(k + 1, k));
+    for (const int pass : {0, 1}) {  // again, for what rounding left
+      static_cast<void>(pass);
+      for (Eigen::Index i = 0; i < k; ++i) {
+        const Row& one = basis_[static_cast<std::size_t>(i)];
+        const Extended along = product(next, one);
+        hessenberg_(i, k - 1) += along;
+        for (std::size_t s = 0; s < next.size(); ++s) next[s] -= along * one[s];
+      }
+    }
+    const Extended length = std::sqrt(product(next, next));
+    hessenberg_(k, k - 1) = length;
+    ended_ = !(length > none_left * hessenberg_.col(k - 1).head(k).norm());
+    find_modes();
+    if (ended_) return true;
+    for (Extended& entry : next) entry /= length;
+    basis_.push_back(std::move(next));
+    return true;
+  }
+
+  struct Told {
+    Extended survival = 0, error = none_proven;  ///< the error relative
+  };
+  /// Returns the probability of surviving m more steps.
+  Told after(Extended m) const {
+    const Extended faded = std::exp(m * log_quasi_);
+    Told told{.survival = settled_ * faded};
+    Extended error = rounded_, weighted = weighted_rounded_;
+    for (const Mode& mode : modes_) {
+      const Extended fading = -std::expm1(mode.log_kept.real());  // a step; beside the quasi-stationary part:
+      const Extended beside = -std::expm1(mode.log_kept.real() - log_quasi_) * std::exp(log_quasi_);
+      const Extended missed = mode.missed * std::min(m, 1 / fading);
+      const bool kept = beside > 0 && missed < mode.size;
+      if (kept) told.survival += (std::exp(m * mode.log_kept) * mode.sum).real();
+      error += kept ? missed : mode.size;
+      weighted += kept ? mode.weighted_missed / beside : mode.weighted_size;
+    }
+    if (told.survival > 0) told.error = error / told.survival;
+    // So late that no number holds it, what survives is quasi-stationary.
+    const Extended faded_in_all = told.survival > 0 ? faded / told.survival : faded == 0 ? 1 / settled_ : none_proven;
+    if (least_weight_ > 0) told.error = std::min(told.error, weighted / least_weight_ * faded_in_all);
+    return told;
+  }
+
+ private:
+  /// Takes the quasi-stationary part out of a row vector and returns how much it was.
+  Extended without_quasi(Row& v) const {
+    const Extended part = product(v, weight_) / product(distribution_, weight_);
+    for (std::size_t i = 0; i < v.size(); ++i) v[i] -= part * distribution_[i];
+    return part;
+  }
+
+  void find_modes() {
+    const Eigen::Index k = hessenberg_.cols();
+    const Eigen::EigenSolver<Projection> solved(hessenberg_.topRows(k));
+    const Eigen::Matrix<Complex, Eigen::Dynamic, Eigen::Dynamic> vectors = solved.eigenvectors();
+    Eigen::Matrix<Complex, Eigen::Dynamic, 1> first = Eigen::Matrix<Complex, Eigen::Dynamic, 1>::Zero(k);
+    first[0] = length_;
+    const Eigen::Matrix<Complex, Eigen::Dynamic, 1> parts = vectors.partialPivLu().solve(first);
+    modes_.clear();
+    Row rest = left_;
+    for (Eigen::Index j = 0; j < k; ++j) {
+      std::vector<Complex> u(left_.size());
+      for (Eigen::Index i = 0; i < k; ++i) {
+        const Complex share = parts[j] * vectors(i, j);
+        for (std::size_t s = 0; s < u.size(); ++s) u[s] += share * basis_[static_cast<std::size_t>(i)][s];
+      }
+      for (std::size_t s = 0; s < u.size(); ++s) rest[s] -= u[s].real();
+      modes_.push_back(measured(u, Extended{1} / solved.eigenvalues()[j]));
+    }
+    rounded_ = weighted_rounded_ = 0;
+    for (std::size_t s = 0; s < rest.size(); ++s) {
+      rounded_ += std::abs(rest[s]);
+      weighted_rounded_ += std::abs(rest[s]) * weight_[s];
+    }
+  }
+
+  Mode measured(const std::vector<Complex>& u, const Complex& mu) const {
+    Mode mode{.log_kept = log_kept(mu), .sum = std::accumulate(u.begin(), u.end(), Complex{})};
+    std::vector<Complex> missed(u.size());  // u (I - Q) - mu u
+    for (std::size_t i = 0; i < u.size(); ++i) {
+      missed[i] += u[i] * generator_.exit(i) - mu * u[i];
+      for (std::size_t e = generator_.start[i]; e < generator_.start[i + 1]; ++e)
+        missed[generator_.column[e]] -= u[i] * generator_.rate[e];
+    }
+    for (std::size_t i = 0; i < u.size(); ++i) {
+      mode.size += std::abs(u[i]);
+      mode.weighted_size += std::abs(u[i]) * weight_[i];
+      mode.missed += std::abs(missed[i]);
+      mode.weighted_missed += std::abs(missed[i]) * weight_[i];
+    }
+    return mode;
+  }
+
+  Generator generator_;
+  Row distribution_, weight_;
+  Extended log_quasi_;
+  GeneratorSolver solver_;
+  Row left_;
+  Extended least_weight_ = 0, settled_ = 0, length_ = 0, rounded_ = 0, weighted_rounded_ = 0;
+  bool ended_ = false;
+  std::vector<Row> basis_;  ///< orthonormal
+  Projection hessenberg_;
+  std::vector<Mode> modes_;
+};
+
+}  // namespace
+
+std::vector<double> survival_by_slow_modes(const Chain& chain, const QuasiStationary& quasi,
+                                           std::span<const double> survivors, std::span<const double> more,
+                                           double widest, const Heard& heard) {
+  SlowModes modes(chain, quasi, survivors, heard);
+  Extended worst = none_proven;
+  for (int k = 0; k < most_modes && modes.grow(); ++k) {
+    if (heard) heard();
+    worst = 0;
+    std::vector<double> told;
+    for (const double m : more) {
+      const SlowModes::Told at = modes.after(m);
+      worst = std::max(worst, at.error);
+      told.push_back(static_cast<double>(at.survival));
+    }
+    if (worst <= widest) return told;
+  }
+  throw ConvergenceError(
+      "survival", static_cast<double>(worst),
+      fmt::format("survivors have not settled, and {} slow modes do not tell how they do", most_modes));
+}
+
+}  // namespace metastable::markov
