@@ -130,7 +130,7 @@ class Settled {
 /// Foresees after how many steps survivors have settled, from the unsettled share half-way and now. What is settled for
 /// all but rounding is settled now.
 double steps_foreseen(double now, double half_way, double share, double harmless) {
-  if (!(share > rounded_share) || !(harmless > 0)) return now;
+  if (!(share > rounded_share)) return now;
   const double fading = std::log(half_way / share) / (now / 2);
   return fading > 0 ? now + std::log(share / harmless) / fading : std::numeric_limits<double>::infinity();
 }
@@ -152,42 +152,49 @@ double never(const Chain& chain, std::span<const double> start, const Heard& hea
   return never;
 }
 
-/// Follows survivors until they have settled, until `last`, or until that many steps are foreseen that modes tell more.
-/// Returns the probability of surviving n = 0, 1, 2 ... steps.
-std::vector<double> follow(Survivors& survivors, const Settled* settled, double last, double anyhow,
-                           const Heard& heard) {
-  const double most = std::max(most_followed, anyhow);
-  std::vector<double> at{survivors.survival()};
-  double half_way = 0;
-  while (static_cast<double>(at.size()) <= last && survivors.any() &&
-         !(settled && settled->reached(survivors.shares()))) {
-    if (heard) heard();
-    const auto now = static_cast<double>(at.size());
-    if (now > most) break;
-    if (settled && now == std::floor(anyhow / 2)) half_way = settled->unsettled(survivors.shares());
-    if (settled && now == anyhow &&
-        steps_foreseen(now, half_way, settled->unsettled(survivors.shares()), settled->harmless()) > most)
-      break;
-    survivors.step();
-    at.push_back(survivors.survival());
+/// What is asked about survivors, and what is known of them so far.
+class Followed {
+ public:
+  Followed(const Chain& chain, std::span<const double> start, const Settled* settled, const Heard& heard)
+      : chain_(chain), settled_(settled), heard_(heard), survivors_(chain, start), at_{survivors_.survival()} {}
+  double now() const { return static_cast<double>(at_.size() - 1); }
+  /// Says whether products are needed no more: all have settled, or failed.
+  bool ended() const { return !survivors_.any() || (settled_ && settled_->reached(survivors_.shares())); }
+  double unsettled() const { return settled_->unsettled(survivors_.shares()); }
+  void follow(double until) {
+    while (now() < until && !ended()) {
+      if (heard_) heard_();
+      survivors_.step();
+      at_.push_back(survivors_.survival());
+    }
   }
-  return at;
-}
-
-/// Returns the probabilities that survivors survive so many more steps.
-std::vector<double> survive_more(const Chain& chain, const QuasiStationary& quasi, const Settled& settled,
-                                 const std::vector<double>& survivors, const std::vector<double>& more,
-                                 const Heard& heard) {
-  if (settled.reached(survivors)) {
-    std::vector<double> told;
-    for (const double m : more) told.push_back(std::exp(settled.log_survival(survivors, m)));
+  /// Returns P(no rest within n steps) for rising n; what lies beyond now by the failure rate, or by slow modes.
+  std::vector<double> told(const QuasiStationary* quasi, const std::vector<double>& steps) const {
+    std::vector<double> told, more;
+    for (const double n : steps)
+      n <= now() ? told.push_back(at_[static_cast<std::size_t>(n)]) : more.push_back(n - now());
+    if (more.empty()) return told;
+    std::vector<double> beyond(more.size(), 0.0);
+    if (survivors_.any() && !ended()) {
+      if (!settled_->has_slow_modes(chain_))
+        throw ConvergenceError("survival", std::numeric_limits<double>::quiet_NaN(),
+                               fmt::format("survivors have not settled after {} steps", now()));
+      beyond = survival_by_slow_modes(chain_, *quasi, survivors_.shares(), more, widest_bound, heard_);
+    } else if (survivors_.any()) {
+      for (std::size_t k = 0; k < more.size(); ++k)
+        beyond[k] = std::exp(settled_->log_survival(survivors_.shares(), more[k]));
+    }
+    for (const double later : beyond) told.push_back(survivors_.survival() * later);
     return told;
   }
-  if (!settled.has_slow_modes(chain))
-    throw ConvergenceError("survival", std::numeric_limits<double>::quiet_NaN(),
-                           "survivors have not settled after as many steps as are followed");
-  return survival_by_slow_modes(chain, quasi, survivors, more, widest_bound, heard);
-}
+
+ private:
+  const Chain& chain_;
+  const Settled* settled_;
+  const Heard& heard_;
+  Survivors survivors_;
+  std::vector<double> at_;
+};
 
 }  // namespace
 
@@ -197,31 +204,37 @@ std::vector<double> bounded_survival_after(const Chain& chain, std::span<const d
   check_survival(chain, start, steps);
   const auto entries = static_cast<double>(chain.entries() + chain.size());
   const double anyhow = std::max(least_followed, std::floor(followed_anyhow / entries));
-  double last = 0;
+  const double most = std::max(most_followed, anyhow);
+  std::vector<double> finite;
   for (const double n : steps)
-    if (std::isfinite(n)) last = std::max(last, n);
-  std::unique_ptr<Settled> settled;
-  if (last > anyhow) settled = std::make_unique<Settled>(chain, quasi());
-  Survivors survivors(chain, start);
-  const std::vector<double> at = follow(survivors, settled.get(), last, anyhow, heard);
-  const auto followed = static_cast<double>(at.size() - 1);
-  std::vector<double> more;
-  for (const double n : steps)
-    if (std::isfinite(n) && n > followed) more.push_back(n - followed);
-  std::vector<double> beyond(more.size(), 0.0);
-  if (!more.empty() && survivors.any())
-    beyond = survive_more(chain, quasi(), *settled, survivors.shares(), more, heard);
-  auto next = beyond.begin();
+    if (std::isfinite(n)) finite.push_back(n);
+  std::ranges::sort(finite);
+  const double last = finite.empty() ? 0 : finite.back();
+  const QuasiStationary* known = last > anyhow ? &quasi() : nullptr;
+  const std::unique_ptr<Settled> settled = known ? std::make_unique<Settled>(chain, *known) : nullptr;
+  Followed followed(chain, start, settled.get(), heard);
+  followed.follow(std::min(last, std::floor(anyhow / 2)));
+  const double half_way = known ? followed.unsettled() : 0;
+  followed.follow(std::min(last, anyhow));
   std::vector<double> told;
-  for (const double n : steps) {
-    if (std::isinf(n))
-      told.push_back(never(chain, start, heard));
-    else if (n <= followed)
-      told.push_back(at[static_cast<std::size_t>(n)]);
-    else
-      told.push_back(survivors.survival() * *next++);
+  if (followed.now() < last && !followed.ended()) {
+    // Nothing is foreseen of shares that have to settle one by one.
+    const double harmless = settled->harmless();
+    const double needed =
+        harmless > 0 ? std::min(last, steps_foreseen(followed.now(), half_way, followed.unsettled(), harmless)) : last;
+    try {
+      if (needed > 2 * anyhow && settled->has_slow_modes(chain)) told = followed.told(known, finite);
+    } catch (const ConvergenceError&) {
+      if (harmless > 0 && needed > most) throw;
+    }
+    if (told.empty()) followed.follow(std::min(last, most));
   }
-  return told;
+  if (told.empty()) told = followed.told(known, finite);
+  std::vector<double> asked;
+  for (const double n : steps)
+    asked.push_back(std::isinf(n) ? never(chain, start, heard)
+                                  : told[static_cast<std::size_t>(std::ranges::find(finite, n) - finite.begin())]);
+  return asked;
 }
 
 }  // namespace metastable::markov

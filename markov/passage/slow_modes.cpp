@@ -18,7 +18,8 @@ using Row = std::vector<Extended>;
 using Complex = std::complex<Extended>;
 using Projection = Eigen::Matrix<Extended, Eigen::Dynamic, Eigen::Dynamic>;
 
-constexpr int most_modes = 40;
+constexpr int most_modes = 100;
+constexpr int asked_each_time = 12;     // modes; beyond, the answer is asked for with each sixth. Saves time
 constexpr Extended none_left = 1e-17L;  // of survivors: rounding
 constexpr Extended none_proven = std::numeric_limits<Extended>::infinity();
 
@@ -54,13 +55,14 @@ class SlowModes {
     length_ = std::sqrt(product(left_, left_));
     basis_.push_back(left_);
     for (Extended& entry : basis_[0]) entry /= length_;
-    if (!(length_ > none_left)) basis_.clear();
+    ended_ = !(length_ > none_left);
   }
 
-  /// Adds a vector to the space; false where there is none to add.
-  bool grow() {
+  bool ended() const { return ended_; }
+  int size() const { return static_cast<int>(hessenberg_.cols()); }
+  /// Adds a vector to the space, unless it has ended.
+  void grow() {
     const auto k = static_cast<Eigen::Index>(basis_.size());
-    if (k == 0 || ended_) return false;
     Row next = solver_.solve_left(basis_.back());
     without_quasi(next);
     hessenberg_.conservativeResizeLike(Projection::Zero(k + 1, k));
@@ -76,11 +78,35 @@ class SlowModes {
     const Extended length = std::sqrt(product(next, next));
     hessenberg_(k, k - 1) = length;
     ended_ = !(length > none_left * hessenberg_.col(k - 1).head(k).norm());
-    find_modes();
-    if (ended_) return true;
+    if (ended_) return;
     for (Extended& entry : next) entry /= length;
     basis_.push_back(std::move(next));
-    return true;
+  }
+
+  /// Takes what is left apart into the modes of the space.
+  void find() {
+    const Eigen::Index k = hessenberg_.cols();
+    const Eigen::EigenSolver<Projection> solved(hessenberg_.topRows(k));
+    const Eigen::Matrix<Complex, Eigen::Dynamic, Eigen::Dynamic> vectors = solved.eigenvectors();
+    Eigen::Matrix<Complex, Eigen::Dynamic, 1> first = Eigen::Matrix<Complex, Eigen::Dynamic, 1>::Zero(k);
+    first[0] = length_;
+    const Eigen::Matrix<Complex, Eigen::Dynamic, 1> parts = vectors.partialPivLu().solve(first);
+    modes_.clear();
+    Row rest = left_;
+    for (Eigen::Index j = 0; j < k; ++j) {
+      std::vector<Complex> u(left_.size());
+      for (Eigen::Index i = 0; i < k; ++i) {
+        const Complex share = parts[j] * vectors(i, j);
+        for (std::size_t s = 0; s < u.size(); ++s) u[s] += share * basis_[static_cast<std::size_t>(i)][s];
+      }
+      for (std::size_t s = 0; s < u.size(); ++s) rest[s] -= u[s].real();
+      modes_.push_back(measured(u, Extended{1} / solved.eigenvalues()[j]));
+    }
+    rounded_ = weighted_rounded_ = 0;
+    for (std::size_t s = 0; s < rest.size(); ++s) {
+      rounded_ += std::abs(rest[s]);
+      weighted_rounded_ += std::abs(rest[s]) * weight_[s];
+    }
   }
 
   struct Told {
@@ -113,31 +139,6 @@ class SlowModes {
     const Extended part = product(v, weight_) / product(distribution_, weight_);
     for (std::size_t i = 0; i < v.size(); ++i) v[i] -= part * distribution_[i];
     return part;
-  }
-
-  void find_modes() {
-    const Eigen::Index k = hessenberg_.cols();
-    const Eigen::EigenSolver<Projection> solved(hessenberg_.topRows(k));
-    const Eigen::Matrix<Complex, Eigen::Dynamic, Eigen::Dynamic> vectors = solved.eigenvectors();
-    Eigen::Matrix<Complex, Eigen::Dynamic, 1> first = Eigen::Matrix<Complex, Eigen::Dynamic, 1>::Zero(k);
-    first[0] = length_;
-    const Eigen::Matrix<Complex, Eigen::Dynamic, 1> parts = vectors.partialPivLu().solve(first);
-    modes_.clear();
-    Row rest = left_;
-    for (Eigen::Index j = 0; j < k; ++j) {
-      std::vector<Complex> u(left_.size());
-      for (Eigen::Index i = 0; i < k; ++i) {
-        const Complex share = parts[j] * vectors(i, j);
-        for (std::size_t s = 0; s < u.size(); ++s) u[s] += share * basis_[static_cast<std::size_t>(i)][s];
-      }
-      for (std::size_t s = 0; s < u.size(); ++s) rest[s] -= u[s].real();
-      modes_.push_back(measured(u, Extended{1} / solved.eigenvalues()[j]));
-    }
-    rounded_ = weighted_rounded_ = 0;
-    for (std::size_t s = 0; s < rest.size(); ++s) {
-      rounded_ += std::abs(rest[s]);
-      weighted_rounded_ += std::abs(rest[s]) * weight_[s];
-    }
   }
 
   Mode measured(const std::vector<Complex>& u, const Complex& mu) const {
@@ -176,8 +177,12 @@ std::vector<double> survival_by_slow_modes(const Chain& chain, const QuasiStatio
                                            double widest, const Heard& heard) {
   SlowModes modes(chain, quasi, survivors, heard);
   Extended worst = none_proven;
-  for (int k = 0; k < most_modes && modes.grow(); ++k) {
+  while (!modes.ended() && modes.size() < most_modes) {
     if (heard) heard();
+    modes.grow();
+    const int size = modes.size();
+    if (!modes.ended() && size > asked_each_time && size % 6 != 0 && size < most_modes) continue;
+    modes.find();
     worst = 0;
     std::vector<double> told;
     for (const double m : more) {
@@ -189,7 +194,7 @@ std::vector<double> survival_by_slow_modes(const Chain& chain, const QuasiStatio
   }
   throw ConvergenceError(
       "survival", static_cast<double>(worst),
-      fmt::format("survivors have not settled, and {} slow modes do not tell how they do", most_modes));
+      fmt::format("survivors have not settled, and {} slow modes do not tell how they do", modes.size()));
 }
 
 }  // namespace metastable::markov

@@ -21,7 +21,7 @@ namespace metastable::markov {
 /// mode.
 /// @param survivors  of a chain of period 1 from every state of which rest can be reached; sum 1
 /// @param more  finite
-/// @throws ConvergenceError where 40 modes do not prove it
+/// @throws ConvergenceError where 100 modes do not prove it
 std::vector<double> survival_by_slow_modes(const Chain& chain, const QuasiStationary& quasi,
                                            std::span<const double> survivors, std::span<const double> more,
                                            double widest, const Heard& heard = {});
