@@ -8,7 +8,7 @@
 namespace metastable::markov {
 namespace {
 
-constexpr double least = 0.25;  // of what the extrapolation's last order moved: its error
+constexpr double least = 0.25;  // of the distance that the coarsest size makes: the error of the value of all sizes
 
 // Returns the value at 0 of the polynomial in h^2 through the values of sizes first .. last - 1, h^2 halving from each
 // to the next.
@@ -38,12 +38,14 @@ Extrapolated extrapolate_sizes(std::span<const std::vector<double>> values) {
   for (const double value : by_shift) spread += (value - e.value) * (value - e.value);
   const double quantile = boost::math::quantile(boost::math::students_t(n - 1), 0.975);
   e.shift_error = quantile * std::sqrt(spread / (n - 1) / n);
-  // What the last order of the extrapolation moved is the error of the one before; its own is smaller by as much as
-  // that order moved less than the ones before it. No more than to a quarter, and with four times what this says.
+  // The value without the coarsest size errs by about its distance from the value of all sizes. The latter errs by
+  // less, in the ratio of that distance to the one from the finest mesh to the value without the coarsest size. Four
+  // times this ratio is taken, but at least a quarter and at most one.
   const double before = std::abs(at_zero(mean, 1, sizes) - mean.back());
   e.discretization_error = std::abs(e.value - at_zero(mean, 1, sizes));
   if (before > 0) e.discretization_error *= std::clamp(4 * e.discretization_error / before, least, 1.0);
-  // Where a fourth size was asked for the square is far off; the error is what the extrapolation by three last moved.
+  // A fourth size is asked for where meshes are too coarse for errors in proportion to h^2. The error is then at least
+  // the distance between the values of the three finest and of the three coarsest sizes.
   if (sizes > 3)
     e.discretization_error = std::max(e.discretization_error,
                                       std::abs(at_zero(mean, sizes - 3, sizes) - at_zero(mean, sizes - 4, sizes - 1)));

@@ -54,7 +54,7 @@ StepsBeforeFailure steps_before_failure(const TransitionModel& model, const std:
 }
 
 // Lists the hypotheses that say what the machine's expected steps are, by probability: the likeliest with its rivals,
-// and without a gap the recalibrated model before them; none where that stands alone.
+// and without a gap the recalibrated model before them. The list is empty where the recalibrated model stands alone.
 std::vector<WeighedFit> telling(const std::vector<const RankedCause*>& ordered, const Fit& recalibrated,
                                 const Fit& cause, const Diagnosis& d) {
   std::vector<WeighedFit> fits;

@@ -78,7 +78,8 @@ class Settled {
       rest += std::abs(survivors[i] - settled * quasi_.distribution[i]) * quasi_.survival_weight[i];
     return rest / settled;
   }
-  /// Says whether what is not settled may be followed by its slow modes.
+  const QuasiStationary& quasi() const { return quasi_; }
+  /// Says whether survival_by_slow_modes() takes the chain.
   bool has_slow_modes(const Chain& chain) const {
     const std::vector<std::uint8_t> can_rest = classify(chain).can_rest;
     return period_.period == 1 && std::ranges::all_of(can_rest, [](std::uint8_t can) { return can != 0; });
@@ -152,13 +153,14 @@ double never(const Chain& chain, std::span<const double> start, const Heard& hea
   return never;
 }
 
-/// What is asked about survivors, and what is known of them so far.
+/// Follows the survivors of a chain step by step, keeps the probability of surviving each number of steps so far, and
+/// foretells that of surviving more.
 class Followed {
  public:
   Followed(const Chain& chain, std::span<const double> start, const Settled* settled, const Heard& heard)
       : chain_(chain), settled_(settled), heard_(heard), survivors_(chain, start), at_{survivors_.survival()} {}
   double now() const { return static_cast<double>(at_.size() - 1); }
-  /// Says whether products are needed no more: all have settled, or failed.
+  /// Says whether the survivors need be followed no further: they have settled, or all have failed.
   bool ended() const { return !survivors_.any() || (settled_ && settled_->reached(survivors_.shares())); }
   double unsettled() const { return settled_->unsettled(survivors_.shares()); }
   void follow(double until) {
@@ -168,8 +170,9 @@ class Followed {
       at_.push_back(survivors_.survival());
     }
   }
-  /// Returns P(no rest within n steps) for rising n; what lies beyond now by the failure rate, or by slow modes.
-  std::vector<double> told(const QuasiStationary* quasi, const std::vector<double>& steps) const {
+  /// Returns P(no rest within n steps) for rising n. Steps that were not followed are foretold by the failure rate
+  /// where survivors have settled, and by slow modes where not.
+  std::vector<double> told(const std::vector<double>& steps) const {
     std::vector<double> told, more;
     for (const double n : steps)
       n <= now() ? told.push_back(at_[static_cast<std::size_t>(n)]) : more.push_back(n - now());
@@ -179,7 +182,7 @@ class Followed {
       if (!settled_->has_slow_modes(chain_))
         throw ConvergenceError("survival", std::numeric_limits<double>::quiet_NaN(),
                                fmt::format("survivors have not settled after {} steps", now()));
-      beyond = survival_by_slow_modes(chain_, *quasi, survivors_.shares(), more, widest_bound, heard_);
+      beyond = survival_by_slow_modes(chain_, settled_->quasi(), survivors_.shares(), more, widest_bound, heard_);
     } else if (survivors_.any()) {
       for (std::size_t k = 0; k < more.size(); ++k)
         beyond[k] = std::exp(settled_->log_survival(survivors_.shares(), more[k]));
@@ -210,26 +213,25 @@ std::vector<double> bounded_survival_after(const Chain& chain, std::span<const d
     if (std::isfinite(n)) finite.push_back(n);
   std::ranges::sort(finite);
   const double last = finite.empty() ? 0 : finite.back();
-  const QuasiStationary* known = last > anyhow ? &quasi() : nullptr;
-  const std::unique_ptr<Settled> settled = known ? std::make_unique<Settled>(chain, *known) : nullptr;
+  const std::unique_ptr<Settled> settled = last > anyhow ? std::make_unique<Settled>(chain, quasi()) : nullptr;
   Followed followed(chain, start, settled.get(), heard);
   followed.follow(std::min(last, std::floor(anyhow / 2)));
-  const double half_way = known ? followed.unsettled() : 0;
+  const double half_way = settled ? followed.unsettled() : 0;
   followed.follow(std::min(last, anyhow));
   std::vector<double> told;
   if (followed.now() < last && !followed.ended()) {
-    // Nothing is foreseen of shares that have to settle one by one.
+    // Where every share has to settle by itself, nothing foretells when: slow modes are tried, then products.
     const double harmless = settled->harmless();
     const double needed =
         harmless > 0 ? std::min(last, steps_foreseen(followed.now(), half_way, followed.unsettled(), harmless)) : last;
     try {
-      if (needed > 2 * anyhow && settled->has_slow_modes(chain)) told = followed.told(known, finite);
+      if (needed > 2 * anyhow && settled->has_slow_modes(chain)) told = followed.told(finite);
     } catch (const ConvergenceError&) {
       if (harmless > 0 && needed > most) throw;
     }
     if (told.empty()) followed.follow(std::min(last, most));
   }
-  if (told.empty()) told = followed.told(known, finite);
+  if (told.empty()) told = followed.told(finite);
   std::vector<double> asked;
   for (const double n : steps)
     asked.push_back(std::isinf(n) ? never(chain, start, heard)

@@ -19,28 +19,28 @@ using Complex = std::complex<Extended>;
 using Projection = Eigen::Matrix<Extended, Eigen::Dynamic, Eigen::Dynamic>;
 
 constexpr int most_modes = 100;
-constexpr int asked_each_time = 12;     // modes; beyond, the answer is asked for with each sixth. Saves time
-constexpr Extended none_left = 1e-17L;  // of survivors: rounding
+constexpr int asked_each_time = 12;     // Up to so many modes each one is tried, then each sixth. This saves time.
+constexpr Extended none_left = 1e-17L;  // A share of survivors below this is rounding.
 constexpr Extended none_proven = std::numeric_limits<Extended>::infinity();
 
 Extended product(std::span<const Extended> a, std::span<const Extended> b) {
   return std::inner_product(a.begin(), a.end(), b.begin(), Extended{0});
 }
 
-/// Returns log(1 - mu), with the digits of a small mu.
+/// Returns log(1 - mu) to as many digits as a small mu has.
 Complex log_kept(const Complex& mu) {
   const Extended square = mu.real() * mu.real() + mu.imag() * mu.imag();
   return {std::log1p(square - 2 * mu.real()) / 2, std::atan2(-mu.imag(), 1 - mu.real())};
 }
 
-/// Holds one mode of what is left: u_j fades as (1 - mu_j)^m. The magnitudes are sums over the states, as they are and
-/// weighted by w.
+/// Holds what is needed of a mode u_j, of which (1 - mu_j)^m is left after m steps.
 struct Mode {
-  Complex log_kept, sum;
-  Extended size = 0, missed = 0, weighted_size = 0, weighted_missed = 0;
+  Complex log_kept, sum;          ///< log(1 - mu_j); the sum of u_j over the states
+  Extended size = 0, missed = 0;  ///< sums over the states of |u_j| and of |D_j|, which it misses in a step
+  Extended weighted_size = 0, weighted_missed = 0;  ///< the same, states weighted by w
 };
 
-/// Survivors without their quasi-stationary part, in a growing Krylov space of (I - Q)^-1.
+/// Takes the quasi-stationary part out of survivors, and the rest apart in a Krylov space of (I - Q)^-1 that grows.
 class SlowModes {
  public:
   SlowModes(const Chain& chain, const QuasiStationary& quasi, std::span<const double> survivors, const Heard& heard)
@@ -66,7 +66,7 @@ class SlowModes {
     Row next = solver_.solve_left(basis_.back());
     without_quasi(next);
     hessenberg_.conservativeResizeLike(Projection::Zero(k + 1, k));
-    for (const int pass : {0, 1}) {  // again, for what rounding left
+    for (const int pass : {0, 1}) {  // The second pass takes out what rounding left in the first.
       static_cast<void>(pass);
       for (Eigen::Index i = 0; i < k; ++i) {
         const Row& one = basis_[static_cast<std::size_t>(i)];
@@ -118,7 +118,8 @@ class SlowModes {
     Told told{.survival = settled_ * faded};
     Extended error = rounded_, weighted = weighted_rounded_;
     for (const Mode& mode : modes_) {
-      const Extended fading = -std::expm1(mode.log_kept.real());  // a step; beside the quasi-stationary part:
+      // The mode loses such a share in a step, as it is and relative to the quasi-stationary part.
+      const Extended fading = -std::expm1(mode.log_kept.real());
       const Extended beside = -std::expm1(mode.log_kept.real() - log_quasi_) * std::exp(log_quasi_);
       const Extended missed = mode.missed * std::min(m, 1 / fading);
       const bool kept = beside > 0 && missed < mode.size;
@@ -127,7 +128,7 @@ class SlowModes {
       weighted += kept ? mode.weighted_missed / beside : mode.weighted_size;
     }
     if (told.survival > 0) told.error = error / told.survival;
-    // So late that no number holds it, what survives is quasi-stationary.
+    // Survival that is too small for a floating-point number has its error relative to the quasi-stationary part.
     const Extended faded_in_all = told.survival > 0 ? faded / told.survival : faded == 0 ? 1 / settled_ : none_proven;
     if (least_weight_ > 0) told.error = std::min(told.error, weighted / least_weight_ * faded_in_all);
     return told;

@@ -36,7 +36,8 @@ TEST(SizeExtrapolation, ShiftsThatScatterHaveTheirTInterval) {
   EXPECT_NEAR(e.shift_error, 4.3027 * 0.1 / std::sqrt(3.0), 1e-5);
 }
 
-// What is left of h^6 is within the error that the sizes show; that of a polynomial in h^2 alone is next to nothing.
+// Three sizes cannot take out a term in h^6: the error must hold what remains of it. A term in h^2 alone is taken out,
+// and the error is then that of rounding.
 TEST(SizeExtrapolation, ErrorsHoldWhatTheSizesDoNotBear) {
   std::vector<double> values = polynomial(1, 0.1, 0.1, 3);
   for (std::size_t i = 0; i < 3; ++i) values[i] += 0.05 * std::pow(0.125, static_cast<double>(i));
