@@ -118,8 +118,8 @@ class Run {
     foresee_other_ways(study_.steps.value, study_.mixing_steps);
     if (study_.steps.upper > widest * study_.steps.lower)
       study_.disagreement = fmt::format(
-          "the meshes do not converge ({:.4g} steps, {:.4g} to {:.4g}){}: no number is given", study_.steps.value,
-          study_.steps.lower, study_.steps.upper,
+          "the meshes do not converge ({:.4g} steps, {:.4g} to {:.4g}){}", study_.steps.value, study_.steps.lower,
+          study_.steps.upper,
           options_.simulated_steps > 0 ? "; " + walks_in_words(map_, start_, walking(options_)).first : std::string());
     if (study_.disagreement.empty()) simulate();
     over(simulation_stage);
@@ -363,8 +363,7 @@ class Run {
     if (blind.missed > most_blind || blind.imagined > most_blind)
       study_.disagreement = fmt::format(
           "the mesh ({:.4g} steps) and random steps ({} of {} at random places end otherwise than those around them, "
-          "and "
-          "stand for {}) disagree: no number is given",
+          "and stand for {}) disagree",
           study_.steps.value, blind.hits, blind.probes,
           blind.missed > blind.imagined
               ? fmt::format("up to {:.2g} times as many failures as the mesh foretells, beside these", blind.missed)
@@ -388,10 +387,10 @@ class Run {
   void see_failures(const std::vector<std::uint64_t>& walked, std::uint64_t longest) {
     study_.walks = count_failures(walked, longest, hazard());
     if (study_.walks->refutes(hazard()))
-      study_.disagreement = fmt::format(
-          "the mesh ({:.4g} steps, {:.4g} to {:.4g}) and direct simulation ({}) disagree: no number is given{}",
-          study_.steps.value, study_.steps.lower, study_.steps.upper, count_text(*study_.walks),
-          simulated_beside(map_, start_, walked, longest, walking(options_)));
+      study_.disagreement =
+          fmt::format("the mesh ({:.4g} steps, {:.4g} to {:.4g}) and direct simulation ({}{}) disagree",
+                      study_.steps.value, study_.steps.lower, study_.steps.upper, count_text(*study_.walks),
+                      simulated_beside(map_, start_, walked, longest, walking(options_)));
   }
 
   void count(std::size_t walks, double longest) {
@@ -581,13 +580,12 @@ MeshStudy mesh_study(const BatchMap& map, std::span<const double> start, const M
 std::string disagreement(const char* one, const MeshEstimate& a, const char* other, const MeshEstimate& b) {
   const double apart = std::abs(std::log(a.value / b.value));
   if (!(a.lower > 0 && b.lower > 0) || apart <= disagrees * std::hypot(half_width(a), half_width(b))) return {};
-  return fmt::format(
-      "{} ({:.4g} steps, {:.4g} to {:.4g}) and {} ({:.4g}, {:.4g} to {:.4g}) disagree: no number is given", one,
-      a.value, a.lower, a.upper, other, b.value, b.lower, b.upper);
+  return fmt::format("{} ({:.4g} steps, {:.4g} to {:.4g}) and {} ({:.4g}, {:.4g} to {:.4g}) disagree", one, a.value,
+                     a.lower, a.upper, other, b.value, b.lower, b.upper);
 }
 
 void require_agreement(const MeshStudy& study, const std::string& what) {
-  if (!study.disagreement.empty()) throw RefutedMesh(fmt::format("{}: {}", what, study.disagreement));
+  if (!study.disagreement.empty()) throw RefutedMesh(what, study.disagreement);
 }
 
 }  // namespace metastable::markov

@@ -8,6 +8,7 @@
 #include <span>
 #include <stdexcept>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "markov/mesh/batch_map.h"
@@ -74,7 +75,7 @@ struct MeshStudy {
   std::string no_guided, no_simulated;
   /// Holds what was simulated where too few walks fail for an estimate: it may refute the mesh and confirms little.
   std::optional<FailureCount> walks;
-  /// Empty, or a sentence that says which ways disagree and that `steps` must not be used.
+  /// Empty, or a clause that says why `steps` must not be used: which ways disagree.
   std::string disagreement;
 };
 
@@ -93,7 +94,12 @@ class Disagreement : public std::runtime_error {
 /// Says that other ways contradict a mesh, or that it does not converge: a way without a mesh may have a number.
 class RefutedMesh : public Disagreement {
  public:
-  using Disagreement::Disagreement;
+  RefutedMesh(const std::string& what, std::string why, const std::string& instead = "")
+      : Disagreement(what + ": " + why + ": no number is given" + instead), why_(std::move(why)) {}
+  const std::string& why() const { return why_; }  ///< a clause
+
+ private:
+  std::string why_;
 };
 
 /// Meshes lie around the start's noise-free orbit. An unstable one leads without noise to another gait, which may come

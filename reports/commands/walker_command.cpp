@@ -50,15 +50,12 @@ std::optional<SplittingAnswer> ask_both_ways(WalkerMethod method, const std::str
   if (method == WalkerMethod::mesh) try {
       mesh();
     } catch (const markov::RefutedMesh& error) {
-      throw markov::RefutedMesh(std::string(error.what()) + " (the method splitting needs no mesh)");
+      throw markov::RefutedMesh(name, error.why(), " (the method splitting needs no mesh)");
     }
   if (method == WalkerMethod::both) try {
       found = mesh();
     } catch (const markov::RefutedMesh& error) {
-      answer.no_mesh = error.what();
-      if (answer.no_mesh.starts_with(name + ": ")) answer.no_mesh.erase(0, name.size() + 2);
-      if (const std::string end = ": no number is given"; answer.no_mesh.ends_with(end))
-        answer.no_mesh.resize(answer.no_mesh.size() - end.size());
+      answer.no_mesh = error.why();
     } catch (const markov::MapError& error) {
       answer.no_mesh = error.what();
     } catch (const markov::TooManyDimensions& error) {

@@ -259,7 +259,6 @@ TEST(MeshStudy, SaysWhereTheWaysDisagree) {
   const MeshStudy study = mesh_study(map, start, options);
   EXPECT_GT(calls, of_meshes);
   EXPECT_NE(study.disagreement.find("direct simulation"), std::string::npos) << study.disagreement;
-  EXPECT_NE(study.disagreement.find("no number is given"), std::string::npos);
 }
 
 TEST(MeshStudy, SimulationRefutesFailuresThatAreSteppedOver) {
@@ -271,7 +270,7 @@ TEST(MeshStudy, SimulationRefutesFailuresThatAreSteppedOver) {
                     hole = said(damped_batch([](double, double, double x) { return std::abs(x - 1) < 0.001; }));
   for (const std::string& text : {wide, narrow, hole}) {
     EXPECT_NE(text.find("of 512 simulated walks fail"), std::string::npos) << text;
-    EXPECT_NE(text.find("no number is given"), std::string::npos) << text;
+    EXPECT_NE(text.find("disagree"), std::string::npos) << text;
   }
   EXPECT_NE(narrow.find("failed within 97 steps, where the mesh foretells 0.0"), std::string::npos) << narrow;
   // The sentence gives the mean of the simulated trials where enough of them fail: 11.8 and 645 steps.
