@@ -442,7 +442,9 @@ Diagnosis answer(const TransitionModel& model, const Fitted& fitted, const std::
   progress(0.88, "steps before failure");
   d.shrinkage.steps = steps_before_failure(model, fitted.given.nuisance, fitted.recalibrated, cause, options.seed);
   if (const auto [at_risk, rests] = model.rests(); at_risk > 0 && !d.shrinkage.measures.empty())
-    d.shrinkage.measures.push_back(rest_shrinkage(at_risk, rests, d.shrinkage.steps));
+    d.shrinkage.measures.push_back(rest_shrinkage(
+        at_risk, rests, d.shrinkage.steps,
+        fmt::format("share of {}s that {}, all trials", d.data.step_name, d.data.collides() ? "rest" : "fail")));
   add_machine_steps(d, model, {&fitted.recalibrated, 1}, telling(ordered, fitted.recalibrated, cause, d), elsewhere,
                     options, [&] { progress(0.9, "steps before failure"); });
   d.shrinkage.profile = collision_profile(model, fitted.given.nuisance, cause, options.seed);

@@ -136,6 +136,9 @@ void say_explained(std::vector<std::string>& s, const Diagnosis& d) {
     s.push_back(
         fmt::format("The likeliest is {} with probability {:.2f}.", with_parameters(likeliest), likeliest.probability));
   }
+  if (const double no_effect = d.causes.p_no_gap + d.causes.p_recalibrate; no_effect > 1 - d.rules.least_at_work)
+    s.push_back(fmt::format("That none acts and other {} are enough has probability {:.2f} all the same.",
+                            d.gap.refitted, no_effect));
   if (!d.causes.size.empty()) s.push_back(d.causes.size);
   if (const auto left =
           std::ranges::count_if(d.gap.left.cells, [](const GapCell& cell) { return cell.p_adjusted < shown_level; }))
@@ -148,13 +151,21 @@ void say_explained(std::vector<std::string>& s, const Diagnosis& d) {
 void say_unexplained(std::vector<std::string>& s, const Diagnosis& d) {
   if (const auto would_do = trials_to_explain(d.data)) {
     s.push_back(
-        fmt::format("There is a gap as given, and {} {} with {} {} of a speed are too few to say what causes it: {} "
+        fmt::format("There is a gap as given, and {} {} with {} {} are too few to say what causes it: {} "
                     "trials like these would do.",
                     d.data.trials, d.data.trials == 1 ? "trial" : "trials", d.data.collisions,
                     d.data.collisions == 1 ? "transition" : "transitions", *would_do));
     return;
   }
   const bool any = !d.causes.ranked.empty();
+  const double no_effect = d.causes.p_no_gap + d.causes.p_recalibrate;
+  if (no_effect > d.causes.p_none && (!any || no_effect > d.causes.ranked.front().probability)) {
+    s.push_back(
+        fmt::format("There is a gap beyond chance (p = {:.2g}) that no effect of the catalogue clearly removes; "
+                    "that none acts and other {} are enough has probability {:.2f}.",
+                    d.gap.p_value, d.gap.refitted, no_effect));
+    return;
+  }
   if (any && d.causes.ranked.front().probability > d.causes.p_none) {
     s.push_back(
         fmt::format("There is a gap that recalibration does not remove. The nearest of the catalogue is {}; "
@@ -327,10 +338,11 @@ std::string next_step(const Diagnosis& d) {
     case Verdict::unexplained:
       if (const auto would_do = trials_to_explain(d.data))
         return fmt::format("Run {} trials like these, or longer ones, and diagnose them together.", *would_do);
-      return "Check the measurement first where the gap shows most (units, leg numbers, sensor noise). If it holds, "
-             "see "
-             "what the cells that stay beyond chance have in common (--out DIR draws the map): no effect of the "
-             "catalogue does that.";
+      return fmt::format(
+          "Check the measurement first where the gap shows most (units, {}, sensor noise). If it holds, see what the "
+          "cells that stay beyond chance have in common (--out DIR draws the map): no effect of the catalogue does "
+          "that.",
+          d.data.collides() ? "leg numbers" : "labels");
   }
   return "";
 }

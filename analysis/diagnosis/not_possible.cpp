@@ -35,8 +35,8 @@ std::vector<NotPossible> not_possible(const TransitionModel& model, const Diagno
   const bool gap = is_gap(d.verdict);
   if (const auto would_do = trials_to_explain(d.data))
     all.push_back({"what causes a gap",
-                   fmt::format("{} {} with {} {} of a speed; causes are named from {} trials and {} transitions on",
-                               d.data.trials, d.data.trials == 1 ? "trial" : "trials", d.data.collisions,
+                   fmt::format("{} {} with {} {}; causes are named from {} trials and {} transitions on", d.data.trials,
+                               d.data.trials == 1 ? "trial" : "trials", d.data.collisions,
                                d.data.collisions == 1 ? "transition" : "transitions", Rules::least_trials_to_explain,
                                Rules::least_transitions_to_explain),
                    would_do, true});
@@ -56,12 +56,12 @@ std::vector<NotPossible> not_possible(const TransitionModel& model, const Diagno
   const auto speeds = static_cast<double>(d.data.collisions);
   if (d.gap.recalibrated.cells.empty() && trials > 0)
     all.push_back({"where the gap lies",
-                   fmt::format("{:.0f} transitions of a speed; a cell of the map takes {}", speeds, least_cell_events),
+                   fmt::format("{:.0f} transitions; a cell of the map takes {}", speeds, least_cell_events),
                    speeds > 0 ? whole(least_cell_events * trials / speeds) : std::nullopt, true});
   else if (model.legs() > 0 && speeds < least_cell_events * model.legs() && speeds > 0)
     all.push_back({"which leg the gap lies in",
-                   fmt::format("{:.0f} transitions of a speed for {} legs; a cell of the map takes {}", speeds,
-                               model.legs(), least_cell_events),
+                   fmt::format("{:.0f} transitions for {} legs; a cell of the map takes {}", speeds, model.legs(),
+                               least_cell_events),
                    whole(least_cell_events * model.legs() * trials / speeds), true});
   for (const Detectability& v : d.limits.visible)
     if (v.times_more > 1)
@@ -74,12 +74,13 @@ std::vector<NotPossible> not_possible(const TransitionModel& model, const Diagno
   } else if (rests == 0) {
     const double steps = d.shrinkage.steps.with_effect, each = at_risk / trials;
     const bool known = std::isfinite(steps) && steps > 1;
-    all.push_back({"the observed steps before failure but for their lower end",
-                   known ? fmt::format("no trial came to rest in {:.0f} {}s; the model expects one in {:.3g}", at_risk,
-                                       d.data.step_name, steps)
-                         : fmt::format("no trial came to rest in {:.0f} {}s, and the model never does", at_risk,
-                                       d.data.step_name),
-                   known ? whole(std::log1p(-surely) / (each * std::log1p(-1 / steps))) : std::nullopt});
+    const char* ended = d.data.collides() ? "came to rest" : "failed";
+    all.push_back(
+        {"the observed steps before failure but for their lower end",
+         known ? fmt::format("no trial {} in {:.0f} {}s; the model expects one in {:.3g}", ended, at_risk,
+                             d.data.step_name, steps)
+               : fmt::format("no trial {} in {:.0f} {}s, and the model never does", ended, at_risk, d.data.step_name),
+         known ? whole(std::log1p(-surely) / (each * std::log1p(-1 / steps))) : std::nullopt});
   }
   return all;
 }

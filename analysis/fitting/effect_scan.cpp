@@ -161,6 +161,9 @@ void project(const TransitionModel& model, const Fit& fit, const Derivatives& al
   scan.by_trial = Eigen::MatrixXd::Zero(static_cast<Eigen::Index>(model.trials()), all.slope.cols());
   for (Eigen::Index k = 0; k < events; ++k)
     scan.by_trial.row(static_cast<Eigen::Index>(model.events()[static_cast<std::size_t>(k)].trial)) += efficient.row(k);
+  scan.by_prior = Eigen::MatrixXd(0, all.slope.cols());
+  if (const Eigen::VectorXd scatter = prior_scatter(model, fit); scatter.size() == weights.rows())
+    scan.by_prior = scatter.asDiagonal() * weights;
   scan.trials_suffice =
       model.trials() >= Rules::enough_trials && model.events().size() >= Rules::enough_transitions * model.trials();
   // At the fit the nuisances' scores balance their prior's: the plain sum of the slopes is efficient already.
@@ -207,7 +210,11 @@ Eigen::MatrixXd rows_of_chance(const EffectScan& scan) {
   // They are taken around their mean, so that a gap does not count as chance.
   const Eigen::RowVectorXd mean = scan.by_trial.colwise().mean();
   Eigen::MatrixXd rows = scan.by_trial.rowwise() - mean;
-  if (scan.trials_suffice) return rows;
+  if (scan.trials_suffice) {
+    rows.conservativeResize(rows.rows() + scan.by_prior.rows(), Eigen::NoChange);
+    rows.bottomRows(scan.by_prior.rows()) = scan.by_prior;
+    return rows;
+  }
   // Trials that scatter more than their transitions would by themselves widen it.
   const double trials = static_cast<double>(rows.rows());
   const Eigen::ArrayXd scatter = rows.colwise().squaredNorm().transpose() * (trials / std::max(1.0, trials - 1));

@@ -22,8 +22,10 @@ struct ScannedEffect {
 /// Holds the efficient scores (nuisances projected out) of all candidates at a fit.
 struct EffectScan {
   std::vector<ScannedEffect> effects;
-  Eigen::VectorXd scores;       ///< [columns] sums of the slopes
-  Eigen::MatrixXd by_trial;     ///< [trials x columns] efficient scores, summed over a trial's events
+  Eigen::VectorXd scores;    ///< [columns] sums of the slopes
+  Eigen::MatrixXd by_trial;  ///< [trials x columns] efficient scores, summed over a trial's events
+  /// [fitted parameters x columns] by how much the scores scatter with what each one's prior states (sd)
+  Eigen::MatrixXd by_prior;
   Eigen::MatrixXd information;  ///< [columns x columns] efficient
   Eigen::VectorXd whole;        ///< [columns] its diagonal before the projection
   bool trials_suffice = true;   ///< to draw chance from them, by Rules::enough_trials and enough_transitions
@@ -45,9 +47,9 @@ struct ScanBeside {
 EffectScan scan_effects(const TransitionModel& model, const Fit& fit, const std::vector<const Candidate*>& candidates,
                         int threads, const ScanBeside& beside = {});
 
-/// Knows how large the scan's gains get by chance alone, by signs and sizes of whole trials' scores drawn anew
-/// (multiplier bootstrap), and what that says of gains found. Few trials, or trials of few transitions, have too few
-/// scores for that: chance has the covariance of the information then.
+/// Knows how large the scan's gains get by chance alone, by signs and sizes of whole trials' scores, and of what
+/// priors state, drawn anew (multiplier bootstrap), and what that says of gains found. Few trials, or trials of few
+/// transitions, have too few scores for that: chance has the covariance of the information then.
 class ChanceGains {
  public:
   /// @param draws  >= 1 @throws std::invalid_argument for fewer

@@ -4,7 +4,9 @@
 #include <boost/math/tools/minima.hpp>
 #include <cmath>
 #include <iterator>
+#include <limits>
 #include <optional>
+#include <tuple>
 
 #include "markov/dense_matrix.h"
 
@@ -262,6 +264,15 @@ Eigen::MatrixXd resolved_root(const Eigen::MatrixXd& information) {
   return markov::resolved_root(information, information.diagonal(), resolved_share);
 }
 
+Eigen::VectorXd prior_scatter(const TransitionModel& model, const Fit& fit) {
+  std::vector<double> scatter;
+  for (std::size_t p = 0; p < fit.nuisance.size(); ++p)
+    scatter.push_back(std::sqrt(model.nuisances()[p].information(fit.nuisance[p])));
+  for (const EffectTerm& term : fit.terms)
+    for (const FreeParameter& p : term.candidate->parameters) scatter.push_back(p.prior_sd > 0 ? 1 / p.prior_sd : 0);
+  return Eigen::VectorXd::Map(scatter.data(), static_cast<Eigen::Index>(scatter.size()));
+}
+
 Eigen::VectorXd event_weights(const TransitionModel& model, const std::vector<char>& count) {
   Eigen::VectorXd weights = Eigen::VectorXd::Ones(static_cast<Eigen::Index>(model.events().size()));
   if (!count.empty())
@@ -343,15 +354,20 @@ Fit fit(const TransitionModel& model, const std::vector<double>& nuisance, const
 std::vector<double> given_values(const TransitionModel& model) {
   constexpr int bits = 10;  // of the best value
   std::vector<double> values = nominal_values(model);
-  for (std::size_t p = 0; p < values.size(); ++p) {
-    const Nuisance& n = model.nuisances()[p];
-    if (!n.assumed) continue;
-    const auto cost = [&](double value) {
-      values[p] = value;
-      return n.cost(value) - model.evaluate(values, {}).total();
-    };
-    values[p] = boost::math::tools::brent_find_minima(cost, n.lower, n.upper, bits).first;
-  }
+  const auto assumed = std::ranges::count_if(model.nuisances(), &Nuisance::assumed);
+  double last = std::numeric_limits<double>::infinity(), now = last;
+  do {  // several move one another
+    last = now;
+    for (std::size_t p = 0; p < values.size(); ++p) {
+      const Nuisance& n = model.nuisances()[p];
+      if (!n.assumed) continue;
+      const auto cost = [&](double value) {
+        values[p] = value;
+        return n.cost(value) - model.evaluate(values, {}).total();
+      };
+      std::tie(values[p], now) = boost::math::tools::brent_find_minima(cost, n.lower, n.upper, bits);
+    }
+  } while (assumed > 1 && now < last - unresolved);
   return values;
 }
 

@@ -79,6 +79,10 @@ Derivatives derivatives(const TransitionModel& model, const std::vector<double>&
 /// @param weights  by event, 1 or 0
 Eigen::MatrixXd information(const Derivatives& columns, const Evaluation& here, const Eigen::VectorXd& weights);
 
+/// Returns by how much the prior's slope at each fitted parameter of a fit, nuisances first, scatters with what is
+/// stated (sd): as one over the prior's sd; 0 without a prior.
+Eigen::VectorXd prior_scatter(const TransitionModel& model, const Fit& fit);
+
 /// Returns 1 or 0 an event. @param count  by trial; empty: all ones
 Eigen::VectorXd event_weights(const TransitionModel& model, const std::vector<char>& count);
 

@@ -100,7 +100,7 @@ struct Rules {
   /// Trials, and transitions of each on average, from whose scores chance levels are drawn. Measurement: with fewer own
   /// data raise alarms above their level (tests/benchmarks/own_data.py --few).
   static constexpr std::size_t enough_trials = 40, enough_transitions = 4;
-  /// Trials, and transitions of a speed in all of them, from which a gap is put down to a cause: contact parameters, an
+  /// Trials, and transitions in all of them, from which a gap is put down to a cause: contact parameters, an
   /// effect, or something without a name. Derivation: five transitions for each of the eight parameters that a
   /// hypothesis fits (means and sds of eta and mu, shape, noise, an effect's own), and as many trials as a trend among
   /// them takes to be told from one odd trial. The tests for a gap are honest below (of 384 folders without one, of 2

@@ -74,7 +74,8 @@ void standardise(std::vector<GapCell>& cells, const std::vector<MapColumn>& colu
     const double kept = whole > 0 ? squares / whole : 1;
     const double own = std::max(kept * column.variance, 1e-24);
     const double scale =
-        std::sqrt(std::max({own, squares, units.rows.col(c).squaredNorm(), units.scatter[c], least_left * whole}));
+        std::sqrt(std::max({own, squares, units.rows.col(c).squaredNorm(), units.scatter[c], least_left * whole}) +
+                  efficient.by_prior.col(c).squaredNorm());
     GapCell& cell = cells[k];
     cell.statistic = std::isfinite(sum) ? sum / scale : 0;  // a fit far off may have no slopes to project on
     // Products of scores spread by what they look for: whether there is anything, the model's own variance tells.
@@ -184,7 +185,9 @@ GapMap gap_map(const TransitionModel& model, const Fit& fit, int draws, std::uin
   std::vector<double> sizes;
   for (const GapCell& cell : map.cells) sizes.push_back(std::abs(cell.statistic));
   const std::vector<std::size_t> order = falling_order(sizes);
-  step_down(map.cells, order, centred(units.rows), draws, seed);
+  Eigen::MatrixXd drawn(units.rows.rows() + efficient.by_prior.rows(), units.rows.cols());
+  drawn << units.rows, efficient.by_prior;
+  step_down(map.cells, order, centred(drawn), draws, seed);
   discover(map.cells, order);
   for (const GapCell& cell : map.cells) map.p_value = std::min(map.p_value, cell.p_adjusted);
   return map;

@@ -264,12 +264,12 @@ double gap_by_itself(const TransitionModel& model, const Fit& chosen, int folds,
   return sum / static_cast<double>(draws);
 }
 
-Shrinkage rest_shrinkage(double at_risk, double rests, const StepsBeforeFailure& steps) {
+Shrinkage rest_shrinkage(double at_risk, double rests, const StepsBeforeFailure& steps, const std::string& measure) {
   const double observed = rests / at_risk;
   const double low = 1 / steps.observed_upper, high = 1 / steps.observed_lower;
   const double given = 1 / steps.baseline, with = 1 / steps.with_effect;
   Shrinkage s;
-  s.measure = "share of collisions that rest, all trials";
+  s.measure = measure;
   s.unit = "probability";
   s.baseline = std::abs(given - observed);
   s.recalibrated = std::abs(1 / steps.recalibrated - observed);

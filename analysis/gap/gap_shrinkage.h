@@ -73,6 +73,6 @@ double gap_by_itself(const TransitionModel& model, const Fit& chosen, int folds,
 /// deviation of such a count from the last model's own expectation. All trials count: rests are too few to hold any
 /// out.
 /// @param at_risk, rests  observed; at_risk > 0
-Shrinkage rest_shrinkage(double at_risk, double rests, const StepsBeforeFailure& steps);
+Shrinkage rest_shrinkage(double at_risk, double rests, const StepsBeforeFailure& steps, const std::string& measure);
 
 }  // namespace metastable::analysis

@@ -187,7 +187,8 @@ MapColumns map_columns(const TransitionModel& model, const Fit& fit) {
 // Parameters move no further than their priors let them.
 EfficientColumns project(const std::vector<MapColumn>& columns, const TransitionModel& model, const Fit& fit) {
   const auto count = static_cast<Eigen::Index>(model.events().size());
-  EfficientColumns all{Eigen::MatrixXd::Zero(count, static_cast<Eigen::Index>(columns.size())), {}, {}};
+  const auto width = static_cast<Eigen::Index>(columns.size());
+  EfficientColumns all{Eigen::MatrixXd::Zero(count, width), {}, {}, Eigen::MatrixXd(0, width)};
   for (std::size_t c = 0; c < columns.size(); ++c)
     for (const auto& [i, value] : columns[c].terms)
       all.dense(static_cast<Eigen::Index>(i), static_cast<Eigen::Index>(c)) = value;
@@ -213,6 +214,7 @@ EfficientColumns project(const std::vector<MapColumn>& columns, const Transition
   const Eigen::MatrixXd weights = root * (root.transpose() * (held.transpose() * all.dense));
   all.dense -= held * weights;
   all.sums -= left.transpose() * weights;
+  all.by_prior = prior_scatter(model, fit).asDiagonal() * weights;
   return all;
 }
 

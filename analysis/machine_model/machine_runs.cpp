@@ -24,9 +24,10 @@ constexpr UnitFactor unit_factors[]{{180 / std::numbers::pi, "degrees where the 
                                     {std::numbers::pi / 180, "radians where the machine has degrees"},
                                     {1000, "thousandths of the machine's unit"},
                                     {0.001, "thousands of the machine's unit"}};
-constexpr double factor_share = 0.15;
-constexpr std::size_t fewest_for_units = 10;             // rows
-constexpr double median_of_normal = 0.6744897501960817;  // of the size of a standard normal
+constexpr double factor_share = 0.15, scatter_share = 0.5;  // of the logarithm; what scatters is known roughly
+constexpr double same_share = 1e-6;                         // of a state, asked for twice
+constexpr std::size_t fewest_for_units = 10;                // rows
+constexpr double median_of_normal = 0.6744897501960817;     // of the size of a standard normal
 
 template <class Known>
 bool every_row(const MachineRuns& runs, Known known) {
@@ -35,18 +36,22 @@ bool every_row(const MachineRuns& runs, Known known) {
   });
 }
 
+std::string name_of(const MachineRuns& runs, std::size_t t) {
+  return runs.trials[t].name.empty() ? std::to_string(t + 1) : runs.trials[t].name;
+}
+
 void require_shape(const Machine& machine, const MachineRuns& runs) {
   for (std::size_t t = 0; t < runs.trials.size(); ++t)
     for (const MachineRow& row : runs.trials[t].rows) {
       if (row.seen.size() != machine.observe.size() || row.inputs.size() != machine.inputs.size())
         throw std::invalid_argument(fmt::format("trial {}: a row has {} states and {} inputs where {} and {} belong",
-                                                t + 1, row.seen.size(), row.inputs.size(), machine.observe.size(),
-                                                machine.inputs.size()));
+                                                name_of(runs, t), row.seen.size(), row.inputs.size(),
+                                                machine.observe.size(), machine.inputs.size()));
       if (std::ranges::any_of(row.seen, [](double x) { return std::isinf(x); }))
-        throw std::invalid_argument(fmt::format("trial {}: a state is infinite", t + 1));
+        throw std::invalid_argument(fmt::format("trial {}: a state is infinite", name_of(runs, t)));
       const bool steps = &row != &runs.trials[t].rows.back() || runs.trials[t].outcome == MachineOutcome::failed;
       if (steps && !std::ranges::all_of(row.inputs, [](double x) { return std::isfinite(x); }))
-        throw std::invalid_argument(fmt::format("trial {}: an input is not a finite number", t + 1));
+        throw std::invalid_argument(fmt::format("trial {}: an input is not a finite number", name_of(runs, t)));
     }
 }
 
@@ -66,7 +71,7 @@ void require_launch(const Machine& machine, const MachineRuns& runs) {
         throw std::invalid_argument(
             fmt::format("launch: trial {} begins without {}, so that its first value has to be "
                         "given with its sd",
-                        t + 1, state));
+                        name_of(runs, t), state));
   }
 }
 
@@ -155,7 +160,13 @@ std::vector<std::string> other_units(const Machine& machine, const MachineRuns& 
   const NominalSteps from = nominal_steps(machine, runs);
   const std::size_t rows = from.after.size(), d = machine.states.size();
   if (rows < fewest_for_units) return {};
-  const std::vector<double> middle = stepped(machine, from, 0, 0);
+  const std::vector<double> middle = stepped(machine, from, 0, 0), again = stepped(machine, from, 0, 0);
+  for (std::size_t i = 0; i < middle.size(); ++i)
+    if (std::isnan(middle[i]) != std::isnan(again[i]) ||
+        std::abs(middle[i] - again[i]) > same_share * std::abs(middle[i]))
+      throw std::invalid_argument(
+          "step: it makes something else of the same states and noise when it is asked again; it must be a function of "
+          "its arguments alone, and take what it draws from the noise");
   std::vector<double> variance(middle.size(), 0.0);
   for (std::size_t m = 0; m < static_cast<std::size_t>(machine.scores); ++m) {
     const std::vector<double> up = stepped(machine, from, m, 1), down = stepped(machine, from, m, -1);
@@ -163,9 +174,9 @@ std::vector<std::string> other_units(const Machine& machine, const MachineRuns& 
       if (std::isfinite(up[i]) && std::isfinite(down[i])) variance[i] += 0.25 * (up[i] - down[i]) * (up[i] - down[i]);
   }
   std::vector<std::string> said;
-  const auto suspect = [&](const std::string& state, const char* what, double ratio) {
+  const auto suspect = [&](const std::string& state, const char* what, double ratio, double share) {
     for (const UnitFactor& unit : unit_factors)
-      if (std::abs(std::log(std::abs(ratio) / unit.factor)) < factor_share)
+      if (std::abs(std::log(std::abs(ratio) / unit.factor)) < share)
         said.push_back(fmt::format("{}: {} {:.3g} times what the machine makes of the rows before: is it in {}?", state,
                                    what, ratio, unit.words));
   };
@@ -181,9 +192,9 @@ std::vector<std::string> other_units(const Machine& machine, const MachineRuns& 
         scatters.push_back(std::abs(seen - foretold) / std::sqrt(own) / median_of_normal);
     }
     if (ratios.size() >= fewest_for_units)
-      suspect(machine.observe[j].state, "its values are", median(std::move(ratios)));
+      suspect(machine.observe[j].state, "its values are", median(std::move(ratios)), factor_share);
     if (scatters.size() >= fewest_for_units)
-      suspect(machine.observe[j].state, "it scatters", median(std::move(scatters)));
+      suspect(machine.observe[j].state, "it scatters", median(std::move(scatters)), scatter_share);
   }
   return said;
 }
@@ -237,17 +248,18 @@ std::vector<std::string> look_over(const Machine& machine, const MachineRuns& ru
   if (transitions < fitted)
     throw std::invalid_argument(fmt::format("runs: {} transition{} fewer than the {} parameters to be refitted",
                                             transitions, transitions == 1 ? " is" : "s are", fitted));
-  require_launch(machine, runs);
   std::vector<std::string> said;
   for (std::size_t j = 0; j < machine.observe.size(); ++j) {
     const std::vector<double> values = column(runs, j);
     if (values.size() < 2)
-      throw std::invalid_argument(fmt::format("runs: {} has {} values", machine.observe[j].state, values.size()));
+      throw std::invalid_argument(fmt::format("runs: {} has {}: every row else misses it", machine.observe[j].state,
+                                              values.empty() ? "no value" : "one value"));
     const auto [least, most] = std::ranges::minmax(values);
     if (least == most)
       throw std::invalid_argument(fmt::format("runs: {} is {} in every row: a column that is constant says nothing",
                                               machine.observe[j].state, least));
   }
+  require_launch(machine, runs);
   for (std::string& sentence : doubled_trials(runs)) said.push_back(std::move(sentence));
   for (std::string& sentence : other_units(machine, runs)) said.push_back(std::move(sentence));
   return said;

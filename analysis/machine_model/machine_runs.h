@@ -27,6 +27,7 @@ struct MachineTrial {
   std::size_t condition = 0;
   std::optional<MachineOutcome> outcome = {};  ///< nothing: not known
   std::vector<MachineRow> rows;                ///< row k is the state after k steps
+  std::string name = {};                       ///< as its user calls it; empty: by its number, from 1
 };
 
 /// Counts the steps of a trial: to each row from the one before, and one more into failure.
@@ -59,7 +60,8 @@ ColumnSpread column_spread(const MachineRuns& runs, std::size_t sensor);
 /// Lists in sentences the signs that the runs are not this machine's: columns in other units, a column that is
 /// constant, trials that are there twice.
 /// @throws std::invalid_argument where they do not fit the machine: no transition, fewer rows than parameters, rows of
-///   another shape, a first row that lacks a state without launch
+///   another shape, a first row that lacks a state without launch; where the map makes something else of the same rows
+///   when it is asked again
 std::vector<std::string> look_over(const Machine& machine, const MachineRuns& runs);
 
 }  // namespace metastable::analysis

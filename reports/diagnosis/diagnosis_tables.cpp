@@ -268,7 +268,7 @@ Table steps_table(const Diagnosis& d) {
   const analysis::StepsBeforeFailure& s = d.shrinkage.steps;
   Table table{.id = "steps",
               .title = "Expected steps before failure (90 % intervals)",
-              .notes = {"This machine: the models, what they lack, and the count of rests."},
+              .notes = {"This machine: the models, what they lack, and the count of failures."},
               .columns = {{.name = "place"},
                           {.name = "observed", .level = 90},
                           {"as given"},

@@ -60,8 +60,9 @@ void ask_step(const py::object& step, const std::vector<std::string>& names, con
       values[names[v].c_str()] = array;
     }
   }
-  take_step(step(rows_of(batch.states, batch.rows), rows_of(batch.scores, batch.rows), values), batch.rows, batch.next,
-            batch.failed);
+  take_step(
+      call_step([&] { return step(rows_of(batch.states, batch.rows), rows_of(batch.scores, batch.rows), values); }),
+      batch.rows, batch.next, batch.failed);
 }
 
 std::shared_ptr<analysis::Machine> machine_of(const py::dict& fields) {
@@ -112,9 +113,12 @@ analysis::MachineRuns runs_of(const py::dict& fields) {
   const Numbers seen = numbers("seen"), inputs = numbers("input_values");
   const Numbers time = numbers("time"), position = numbers("position");
   const auto outcomes = fields["outcome"].cast<py::list>();
+  const auto names = fields["trial_names"].cast<std::vector<std::string>>();
   for (py::ssize_t t = 0; t < condition.size(); ++t)
-    runs.trials.push_back(
-        {static_cast<std::size_t>(condition.at(t)), outcome_of(outcomes[static_cast<std::size_t>(t)]), {}});
+    runs.trials.push_back({static_cast<std::size_t>(condition.at(t)),
+                           outcome_of(outcomes[static_cast<std::size_t>(t)]),
+                           {},
+                           names[static_cast<std::size_t>(t)]});
   for (py::ssize_t i = 0; i < trial.size(); ++i) {
     analysis::MachineRow row;
     for (py::ssize_t j = 0; j < seen.shape(1); ++j) row.seen.push_back(seen.at(i, j));

@@ -143,7 +143,9 @@ markov::BatchMap batch_of(const PythonMap& python, Call& call) {
     call.ask([&] {
       const std::size_t rows = failed.size();
       const py::object state = rows_of(states, rows), noise = rows_of(scores, rows);
-      take_step(python.phases > 1 ? python.step(state, noise, phase) : python.step(state, noise), rows, next, failed);
+      take_step(
+          call_step([&] { return python.phases > 1 ? python.step(state, noise, phase) : python.step(state, noise); }),
+          rows, next, failed);
     });
   };
   markov::require_start(map, python.start);

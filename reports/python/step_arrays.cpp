@@ -51,6 +51,17 @@ py::array_t<double> rows_of(std::span<const double> values, std::size_t rows) {
   return array;
 }
 
+py::object call_step(const std::function<py::object()>& step) {
+  try {
+    return step();
+  } catch (py::error_already_set& error) {
+    const std::string said = py::str(error.value());
+    if (error.matches(PyExc_ValueError) && said.find("read-only") != std::string::npos)
+      throw py::value_error("step: it writes into one of its arguments, which it may not (" + said + ")");
+    throw;
+  }
+}
+
 void take_step(const py::object& returned, std::size_t rows, std::span<double> next, std::span<std::uint8_t> failed) {
   if (!py::isinstance<py::tuple>(returned) || py::len(returned) != 2)
     refuse(fmt::format("(next states, failed) is to be returned, not {}",

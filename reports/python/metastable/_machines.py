@@ -138,8 +138,11 @@ class Runs:
 
         unknown = set(columns) - {"trial", "condition", "phase", "time_s", "position_m", *machine.sensor}
         if unknown:
-            raise InputError(f"runs: \"{sorted(unknown)[0]}\" is none of the columns trial, condition, phase, time_s, "
-                             f"position_m, {', '.join(machine.sensor)}")
+            name = sorted(unknown)[0]
+            where = f": an input is given in inputs={{'{name}': ...}}" if name in machine.inputs else \
+                f"; a label is given in labels={{'{name}': ...}}"
+            raise InputError(f"runs: \"{name}\" is none of the columns trial, condition, phase, time_s, "
+                             f"position_m, {', '.join(machine.sensor)}{where}")
         trial = find("trial")
         if trial is None:
             raise InputError("runs: there is no column trial")
@@ -177,7 +180,7 @@ class Runs:
         self.rows = rows
         self._columns = tuple(machine.sensor), machine.inputs
         self._laid_out = dict(
-            trial=index, seen=numpy.column_stack(seen) if rows else numpy.zeros((0, len(seen))),
+            trial=index, trial_names=[str(name) for name in numpy.asarray(trial)[first]] if rows else [], seen=numpy.column_stack(seen) if rows else numpy.zeros((0, len(seen))),
             time=optional["time_s"], position=optional["position_m"], phase=phase, phases=phases,
             conditions=conditions, trial_condition=condition[first] if rows else numpy.zeros(0, int), labels=label_values,
             label_index=numpy.column_stack(label_index) if label_index else numpy.zeros((rows, 0), int),

@@ -95,7 +95,7 @@ TEST(RestShrinkage, SharesAreThoseOfCounts) {
   steps.baseline = 500;
   steps.recalibrated = 400;
   steps.with_effect = 10000.0 / 39;
-  const Shrinkage s = rest_shrinkage(10000, 40, steps);
+  const Shrinkage s = rest_shrinkage(10000, 40, steps, "share that fails");
   EXPECT_NEAR(s.baseline, 0.002, 1e-12);
   EXPECT_NEAR(s.baseline_lower, 0.00102, 1e-9);
   EXPECT_NEAR(s.baseline_upper, 0.003207, 1e-9);
@@ -115,7 +115,7 @@ TEST(RestShrinkage, SaysNoShareWhereTheGapMayBeNone) {
   steps.observed_upper = std::numeric_limits<double>::infinity();
   steps.baseline = 10000.0 / 35;
   steps.recalibrated = steps.with_effect = std::numeric_limits<double>::infinity();
-  const Shrinkage s = rest_shrinkage(10000, 40, steps);
+  const Shrinkage s = rest_shrinkage(10000, 40, steps, "share that fails");
   EXPECT_EQ(s.baseline_lower, 0);
   EXPECT_EQ(s.floor, 0);
   EXPECT_NEAR(s.with_effect, 0.004, 1e-12);

@@ -80,7 +80,7 @@ analysis::Diagnosis sample() {
   d.limits.visible = {{"leg_contact", "friction_ratio", 0.04, {{"leg_lengths", 0.7}}, ""},
                       {"sensor_noise", "sd_rad_s", 0, {}, "no noise is stated"}};
   d.limits.missing = {{"leg", {{"leg_contact", "friction_ratio", {}, 0.04, {"friction_patch"}}}}, {"position_m", {}}};
-  d.limits.not_possible = {{"where the gap lies", "7 transitions of a speed; a cell of the map takes 20", 3, true}};
+  d.limits.not_possible = {{"where the gap lies", "7 transitions; a cell of the map takes 20", 3, true}};
   d.limits.next = {{"slopes flatter by 2 deg", {{"slope_deg_by", -2}}, 21.5}};
   d.data.condition_names = {"fast"};
   for (int k = 1; k <= 3; ++k)
