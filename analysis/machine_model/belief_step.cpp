@@ -54,12 +54,14 @@ BeliefStep<Most>::BeliefStep(MachineStepper& stepper, const ScorePlan& plan, std
     : stepper_(stepper), lattice_{plan.lattice, {}}, fails_(plan.failing.has_value()), shared_(shared), bent_(bent) {
   std::vector<std::size_t>& scores = lattice_.scores;
   if (!scores.empty()) lattice_.axis = lattice_axis(static_cast<int>(scores.size()), bent);
+  if (scores.size() == 1) axis_.emplace(lattice_.axis);
   if (plan.failing && scores.front() != *plan.failing) std::swap(scores.front(), scores.back());
   for (std::size_t m = 0; m < stepper_.scores(); ++m)
     if (std::ranges::find(lattice_.scores, m) == lattice_.scores.end()) straight_.push_back(m);
 }
 
-// The centre, pairs along the root and the straight scores, the lattice, and pairs at both ends of each of its scores.
+// The centre, unless the lattice has it, pairs along the root and the straight scores, the lattice, and for each of its
+// scores the same pairs once more, the upper point of each where the score is above zero, the lower one below.
 template <int Most>
 void BeliefStep<Most>::add_points(const TransitionPlace& place, const Part& belief, const Matrix& root) {
   const Vector mean = belief.mean.head(size());
@@ -67,36 +69,88 @@ void BeliefStep<Most>::add_points(const TransitionPlace& place, const Part& beli
   const auto unit = [&](std::size_t score) {
     return Vector(Vector::Unit(still.size(), static_cast<Eigen::Index>(score)));
   };
-  stepper_.add(place, mean, still);
-  const auto add_pairs = [&](const Vector& fresh) {
+  if (lattice_.scores.empty()) stepper_.add(place, mean, still);
+  const auto add_pairs = [&](const Vector& beside) {
     for (const Eigen::Index i : used_)
-      for (const double sign : {reach, -reach}) stepper_.add(place, mean + sign * root.col(i).head(size()), fresh);
+      for (const double sign : {1.0, -1.0})
+        stepper_.add(place, mean + sign * reach * root.col(i).head(size()), sign * beside);
     for (const std::size_t s : straight_)
-      for (const double sign : {reach, -reach}) stepper_.add(place, mean, fresh + sign * unit(s));
+      for (const double sign : {1.0, -1.0}) stepper_.add(place, mean, sign * (beside + reach * unit(s)));
   };
   add_pairs(still);
   for (std::size_t p = 0; p < lattice_.points(); ++p)
     stepper_.add(place, mean, lattice_.template at<Vector>(p, stepper_.scores()));
-  for (const std::size_t score : lattice_.scores)
-    for (const double sign : {reach, -reach}) add_pairs(sign * unit(score));
+  for (const std::size_t score : lattice_.scores) add_pairs(beside() * unit(score));
+}
+
+// The score at which slopes are taken once more: a point of the lattice near sqrt 3.
+template <int Most>
+std::size_t BeliefStep<Most>::spacings_beside() const {
+  return static_cast<std::size_t>(std::lround(reach / lattice_.axis.spacing));
+}
+template <int Most>
+double BeliefStep<Most>::beside() const {
+  return static_cast<double>(spacings_beside()) * lattice_.axis.spacing;
+}
+
+// The point without a score: the middle one of the lattice, where there is one.
+template <int Most>
+std::size_t BeliefStep<Most>::centre_of(std::size_t trial) const {
+  return lattice_.scores.empty() ? trial * points_ : lattice_start(trial) + lattice_.points() / 2;
+}
+
+// Says whether a point of a lattice over one score is none of the nodes that tell the others.
+template <int Most>
+bool BeliefStep<Most>::between_nodes(std::size_t point) const {
+  const std::size_t at = point % points_, first = lattice_start(0);
+  return at >= first && at < first + lattice_.points() && !std::ranges::binary_search(axis_->nodes(), at - first);
+}
+
+// Tells the points of a trial's lattice from its nodes. Returns whether a polynomial holds there: it does not where a
+// point failed.
+template <int Most>
+bool BeliefStep<Most>::told(std::size_t trial) {
+  const std::vector<std::size_t>& nodes = axis_->nodes();
+  const std::size_t start = lattice_start(trial);
+  for (std::size_t point = trial * points_; point < (trial + 1) * points_; ++point)
+    if (!between_nodes(point) && stepper_.failed(point)) return false;
+  Eigen::MatrixXd at_nodes(static_cast<Eigen::Index>(nodes.size()), states());
+  for (std::size_t k = 0; k < nodes.size(); ++k)
+    at_nodes.row(static_cast<Eigen::Index>(k)) = stepper_.next(start + nodes[k]).transpose();
+  if (!axis_->holds(at_nodes)) return false;
+  const Eigen::MatrixXd all = axis_->told(at_nodes);
+  for (std::size_t p = 0; p < lattice_.points(); ++p)
+    if (between_nodes(start + p)) stepper_.tell(start + p, all.row(static_cast<Eigen::Index>(p)).transpose());
+  return true;
+}
+
+// Steps all points, of a lattice over one score first the nodes, and the others where these do not tell them.
+template <int Most>
+void BeliefStep<Most>::run_points(std::size_t trials) {
+  if (!axis_) return stepper_.run();
+  std::vector<std::size_t> asked, others;
+  for (std::size_t point = 0; point < trials * points_; ++point)
+    if (!between_nodes(point)) asked.push_back(point);
+  stepper_.run(asked);
+  for (std::size_t t = 0; t < trials; ++t)
+    for (std::size_t p = told(t) ? points_ : 0; p < points_; ++p)
+      if (between_nodes(t * points_ + p)) others.push_back(t * points_ + p);
+  if (!others.empty()) stepper_.run(others);
 }
 
 // A slope is the central difference of a pair of points. If one of the two failed, the one-sided difference to the
-// centre replaces it; `known` marks the pairs of which neither failed.
+// centre replaces it.
 template <int Most>
-BeliefMatrix<Most> BeliefStep<Most>::first_differences(std::size_t at, const Vector* centre, Matrix* bend,
-                                                       std::vector<char>* known) const {
+BeliefMatrix<Most> BeliefStep<Most>::first_differences(std::size_t at, const Vector* centre, Matrix& bend) const {
   Matrix slope = Matrix::Zero(states(), static_cast<Eigen::Index>(pairs()));
-  if (bend) *bend = slope;
-  if (known) known->assign(pairs(), 0);
+  bend = slope;
   for (std::size_t i = 0; i < pairs(); ++i) {
     const bool lost_up = stepper_.failed(at + 2 * i), lost_down = stepper_.failed(at + 2 * i + 1);
     const auto column = static_cast<Eigen::Index>(i);
     if (!lost_up && !lost_down) {
       const Vector up = stepper_.next(at + 2 * i), down = stepper_.next(at + 2 * i + 1);
       slope.col(column) = (up - down) / (2 * reach);
-      if (bend && centre) bend->col(column) = up + down - 2 * *centre;
-      if (known) (*known)[i] = 1;
+      if (centre) bend.col(column) = up + down - 2 * *centre;
     } else if (centre && lost_up != lost_down) {
       const Vector one = stepper_.next(at + 2 * i + (lost_up ? 1 : 0));
       slope.col(column) = (lost_up ? Vector(*centre - one) : Vector(one - *centre)) / reach;
@@ -105,28 +159,37 @@ BeliefMatrix<Most> BeliefStep<Most>::first_differences(std::size_t at, const Vec
   return slope;
 }
 
+// How slopes change with a score of the lattice: by the corners of a rectangle of the pair's direction and the score,
+// above and below; by one of the two where the machine fails at a corner of the other.
+template <int Most>
+BeliefMatrix<Most> BeliefStep<Most>::mixed_differences(std::size_t trial, std::size_t axis) const {
+  Matrix change = Matrix::Zero(states(), static_cast<Eigen::Index>(pairs()));
+  const std::size_t pair = pair_start(trial), centre = centre_of(trial),
+                    corner = lattice_start(trial) + lattice_.points() + 2 * pairs() * axis,
+                    away = spacings_beside() * (axis > 0 ? lattice_.axis.points.size() : 1);
+  for (std::size_t i = 0; i < pairs(); ++i) {
+    int known = 0;
+    for (const bool up : {true, false}) {
+      const std::array<std::size_t, 4> at{corner + 2 * i + (up ? 0 : 1), pair + 2 * i + (up ? 0 : 1),
+                                          up ? centre + away : centre - away, centre};
+      if (std::ranges::any_of(at, [&](std::size_t point) { return stepper_.failed(point); })) continue;
+      ++known;
+      change.col(static_cast<Eigen::Index>(i)) +=
+          stepper_.next(at[0]) - stepper_.next(at[1]) - stepper_.next(at[2]) + stepper_.next(at[3]);
+    }
+    change.col(static_cast<Eigen::Index>(i)) /= std::max(1, known) * reach * beside();
+  }
+  return change;
+}
+
 template <int Most>
 typename BeliefStep<Most>::Slopes BeliefStep<Most>::slopes(std::size_t trial) const {
-  const std::size_t first = trial * points_;
   Slopes s;
-  s.centre = stepper_.next(first);
-  const bool lost = stepper_.failed(first);
+  s.centre = stepper_.next(centre_of(trial));
+  const bool lost = stepper_.failed(centre_of(trial));
   if (lost) s.centre.setZero();  // a failed state is none
-  s.first = first_differences(first + 1, lost ? nullptr : &s.centre, &s.bend, nullptr);
-  std::size_t at = lattice_start(trial) + lattice_.points();
-  for (std::size_t b = 0; b < lattice_.scores.size(); ++b, at += 4 * pairs()) {
-    std::vector<char> above, below;
-    const Matrix up = first_differences(at, nullptr, nullptr, &above);
-    const Matrix down = first_differences(at + 2 * pairs(), nullptr, nullptr, &below);
-    Matrix& change = s.by_score.emplace_back(Matrix::Zero(states(), static_cast<Eigen::Index>(pairs())));
-    for (std::size_t i = 0; i < pairs(); ++i) {
-      const auto c = static_cast<Eigen::Index>(i);
-      if (above[i] && below[i])
-        change.col(c) = (up.col(c) - down.col(c)) / (2 * reach);
-      else if (above[i] || below[i])
-        change.col(c) = (above[i] ? Vector(up.col(c) - s.first.col(c)) : Vector(s.first.col(c) - down.col(c))) / reach;
-    }
-  }
+  s.first = first_differences(pair_start(trial), lost ? nullptr : &s.centre, s.bend);
+  for (std::size_t b = 0; b < lattice_.scores.size(); ++b) s.by_score.push_back(mixed_differences(trial, b));
   return s;
 }
 
@@ -383,10 +446,10 @@ void BeliefStep<Most>::step(std::span<const TransitionPlace> places, std::span<c
   for (Eigen::Index i = 0; !roots.empty() && i < roots.front().cols(); ++i)
     if (std::ranges::any_of(roots, [&](const Matrix& root) { return root.col(i).head(size()).any(); }))
       used_.push_back(i);
-  points_ = 1 + 2 * pairs() + lattice_.points() + 4 * pairs() * lattice_.scores.size();
+  points_ = pair_start(0) + 2 * pairs() + lattice_.points() + 2 * pairs() * lattice_.scores.size();
   stepper_.clear();
   for (std::size_t t = 0; t < places.size(); ++t) add_points(places[t], beliefs[t], roots[t]);
-  stepper_.run();
+  run_points(places.size());
   std::vector<FailureLine<Most>> lines;
   const FailureEdges<Most> edges(stepper_, lattice_, points_, lattice_start(0));
   if (fails_) lines = edges.lines(places, beliefs, roots, used_);

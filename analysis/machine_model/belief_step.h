@@ -48,9 +48,17 @@ class BeliefStep {
   Eigen::Index states() const { return static_cast<Eigen::Index>(stepper_.states()); }
   Eigen::Index size() const { return static_cast<Eigen::Index>(stepper_.size()); }
   std::size_t pairs() const { return used_.size() + straight_.size(); }
-  std::size_t lattice_start(std::size_t trial) const { return trial * points_ + 1 + 2 * pairs(); }
+  std::size_t pair_start(std::size_t trial) const { return trial * points_ + (lattice_.scores.empty() ? 1 : 0); }
+  std::size_t lattice_start(std::size_t trial) const { return pair_start(trial) + 2 * pairs(); }
+  std::size_t centre_of(std::size_t trial) const;
+  std::size_t spacings_beside() const;
+  double beside() const;
   void add_points(const TransitionPlace& place, const Part& belief, const Matrix& root);
-  Matrix first_differences(std::size_t at, const Vector* centre, Matrix* bend, std::vector<char>* known) const;
+  void run_points(std::size_t trials);
+  bool between_nodes(std::size_t point) const;
+  bool told(std::size_t trial);
+  Matrix first_differences(std::size_t at, const Vector* centre, Matrix& bend) const;
+  Matrix mixed_differences(std::size_t trial, std::size_t axis) const;
   Slopes slopes(std::size_t trial) const;
   Matrix columns(const Matrix& slope, const Matrix& root) const;
   Part part(const Slopes& slopes, const Part& belief, const Matrix& root) const;
@@ -65,7 +73,8 @@ class BeliefStep {
                   std::span<const FailureLine<Most>> lines, const FailureEdges<Most>& edges) const;
 
   MachineStepper& stepper_;
-  ScoreLattice lattice_;  // its first score is the failing one
+  ScoreLattice lattice_;                // its first score is the failing one
+  std::optional<AxisPolynomial> axis_;  // of a lattice over one score
   bool fails_;
   std::size_t shared_;
   bool bent_;

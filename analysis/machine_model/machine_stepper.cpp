@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <numeric>
 #include <utility>
 
 namespace metastable::analysis {
@@ -33,6 +34,8 @@ void MachineStepper::clear() {
   places_.clear();
   states_.clear();
   scores_.clear();
+  next_.clear();
+  failed_.clear();
   for (std::vector<double>& one : values_) one.clear();
 }
 
@@ -96,20 +99,50 @@ void MachineStepper::add_straight(const TransitionPlace& place, const Eigen::Ref
   for (std::size_t i = 0; i < row.inputs.size(); ++i) values_[lower_.size() + i].push_back(row.inputs[i]);
 }
 
+// Takes what the map returned for a point.
+void MachineStepper::take(std::size_t point, std::span<const double> next, std::uint8_t failed) {
+  std::ranges::copy(next, next_.begin() + static_cast<std::ptrdiff_t>(point * states()));
+  failed_[point] = failed;
+  if (failed) return;
+  if (!std::ranges::all_of(next, [](double x) { return std::isfinite(x); })) failed_[point] = lost_mark;
+  for (const auto& push : supposed_.pushes)
+    next_[point * states() + push.state] += push.transition[places_[point].number];
+}
+
 void MachineStepper::run() {
-  const std::size_t rows = places_.size();
+  next_.clear();
+  std::vector<std::size_t> all(places_.size());
+  std::iota(all.begin(), all.end(), std::size_t{0});
+  run(all);
+}
+
+void MachineStepper::run(std::span<const std::size_t> points) {
+  const std::size_t rows = points.size();
+  next_.resize(places_.size() * states());
+  failed_.resize(places_.size());
+  std::vector<double> from, scores, next(rows * states());
+  std::vector<std::uint8_t> failed(rows);
+  std::vector<std::vector<double>> values(values_.size());
   for (std::size_t v = 0; v < lower_.size(); ++v)
-    if (!varies_[v]) values_[v] = {std::clamp(supposed_.values[v], lower_[v], upper_[v])};
-  next_.assign(rows * states(), 0.0);
-  failed_.assign(rows, 0);
-  const std::vector<std::span<const double>> spans(values_.begin(), values_.end());
-  machine_.step({rows, states_, scores_, spans, next_, failed_});
-  for (std::size_t i = 0; i < rows; ++i) {
-    if (failed_[i]) continue;
-    for (std::size_t s = 0; s < states(); ++s)
-      if (!std::isfinite(next_[i * states() + s])) failed_[i] = lost_mark;
-    for (const auto& push : supposed_.pushes) next_[i * states() + push.state] += push.transition[places_[i].number];
+    if (!varies_[v]) values[v] = {std::clamp(supposed_.values[v], lower_[v], upper_[v])};
+  const auto add = [](std::vector<double>& to, const std::vector<double>& all, std::size_t point, std::size_t each) {
+    const auto first = all.begin() + static_cast<std::ptrdiff_t>(point * each);
+    to.insert(to.end(), first, first + static_cast<std::ptrdiff_t>(each));
+  };
+  for (const std::size_t point : points) {
+    add(from, states_, point, states());
+    add(scores, scores_, point, this->scores());
+    for (std::size_t v = 0; v < values.size(); ++v)
+      if (v >= lower_.size() || varies_[v]) values[v].push_back(values_[v][point]);
   }
+  const std::vector<std::span<const double>> spans(values.begin(), values.end());
+  machine_.step({rows, from, scores, spans, next, failed});
+  for (std::size_t i = 0; i < rows; ++i) take(points[i], std::span(next).subspan(i * states(), states()), failed[i]);
+}
+
+void MachineStepper::tell(std::size_t point, const Eigen::Ref<const Eigen::VectorXd>& next) {
+  std::copy_n(next.data(), states(), next_.begin() + static_cast<std::ptrdiff_t>(point * states()));
+  failed_[point] = 0;
 }
 
 bool MachineStepper::lost(std::size_t point) const { return failed_[point] == lost_mark; }

@@ -5,6 +5,7 @@
 #include <cmath>
 #include <cstdint>
 #include <optional>
+#include <span>
 #include <vector>
 
 #include "analysis/machine_model/machine.h"
@@ -53,6 +54,10 @@ class MachineStepper {
            const Eigen::Ref<const Eigen::VectorXd>& fresh);
   /// Steps all points added. A state that is not finite counts as failed.
   void run();
+  /// Steps some of the points added; what is known of the others stays.
+  void run(std::span<const std::size_t> points);
+  /// Takes the next state of a point that did not fail from elsewhere.
+  void tell(std::size_t point, const Eigen::Ref<const Eigen::VectorXd>& next);
   /// Says whether it counts as failed for want of a finite state alone.
   bool lost(std::size_t point) const;
   /// Returns the next states of a point, and whether it failed.
@@ -62,6 +67,7 @@ class MachineStepper {
  private:
   void add_straight(const TransitionPlace& place, const Eigen::Ref<const Eigen::VectorXd>& point,
                     const Eigen::Ref<const Eigen::VectorXd>& fresh);
+  void take(std::size_t point, std::span<const double> next, std::uint8_t failed);
   double value_at(std::size_t value, const TransitionPlace& place,
                   const Eigen::Ref<const Eigen::VectorXd>& point) const;
 

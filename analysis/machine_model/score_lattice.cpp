@@ -1,7 +1,9 @@
 #include "analysis/machine_model/score_lattice.h"
 
+#include <Eigen/LU>
 #include <algorithm>
 #include <cmath>
+#include <numbers>
 
 #include "dynamics/numerics/truncated_normal.h"
 
@@ -16,6 +18,10 @@ constexpr double spacing_share = 0.92;
 struct CellSize {
   double spread, reach;
 };
+// Nodes of an axis from which its other points are told, the share of a unit's move by which the highest powers may
+// matter, and the width of the weights exp(-z^2 / width) of the points.
+constexpr int most_nodes = 9;
+constexpr double told_share = 1e-4, told_width = 8, told_rounding = 1e-12;
 constexpr CellSize fine{0.4, 5.6}, for_bent{0.5, 4.7}, on_two_axes{0.7, 4.7};
 
 }  // namespace
@@ -39,6 +45,43 @@ LatticeAxis lattice_axis(int axes, bool bent) {
   for (double& weight : axis.weights) weight /= sum;
   for (double& share : axis.shares) share /= whole;
   return axis;
+}
+
+// The basis of Chebyshev's polynomials on the axis keeps the equations for the nodes well conditioned.
+AxisPolynomial::AxisPolynomial(const LatticeAxis& axis) {
+  const std::size_t n = axis.points.size();
+  const auto last = static_cast<double>(n - 1);
+  for (int k = 0; k < most_nodes; ++k) {
+    const double share = 0.5 - 0.5 * std::cos(std::numbers::pi * k / (most_nodes - 1));
+    const auto node = static_cast<std::size_t>(std::lround(share * last));
+    if (nodes_.empty() || nodes_.back() < node) nodes_.push_back(node);
+  }
+  length_ = axis.points.back() - axis.points.front();
+  const auto count = static_cast<Eigen::Index>(nodes_.size()), points = static_cast<Eigen::Index>(n);
+  const auto basis = [&](std::size_t point) {
+    Eigen::RowVectorXd row(count);
+    const double angle = std::acos(std::clamp(2 * (axis.points[point] - axis.points.front()) / length_ - 1, -1.0, 1.0));
+    for (Eigen::Index power = 0; power < count; ++power) row[power] = std::cos(static_cast<double>(power) * angle);
+    return row;
+  };
+  Eigen::MatrixXd at_nodes(count, count), at_points(points, count);
+  for (Eigen::Index k = 0; k < count; ++k) at_nodes.row(k) = basis(nodes_[static_cast<std::size_t>(k)]);
+  for (Eigen::Index p = 0; p < points; ++p) at_points.row(p) = basis(static_cast<std::size_t>(p));
+  const Eigen::MatrixXd coefficients = at_nodes.partialPivLu().inverse();
+  told_ = at_points * coefficients;
+  highest_.resize(2 * points, count);
+  for (Eigen::Index p = 0; p < points; ++p) {
+    const double z = axis.points[static_cast<std::size_t>(p)], weight = std::exp(-z * z / told_width);
+    for (Eigen::Index power = 0; power < 2; ++power)
+      highest_.row(2 * p + power) = weight * at_points(p, count - 1 - power) * coefficients.row(count - 1 - power);
+  }
+}
+
+bool AxisPolynomial::holds(const Eigen::MatrixXd& at_nodes) const {
+  const Eigen::RowVectorXd most = (highest_ * at_nodes).cwiseAbs().colwise().maxCoeff();
+  const Eigen::RowVectorXd moves = (at_nodes.bottomRows<1>() - at_nodes.topRows<1>()).cwiseAbs() / length_;
+  const Eigen::RowVectorXd rounding = told_rounding * at_nodes.cwiseAbs().colwise().maxCoeff();
+  return (most.array() <= told_share * moves.array() + rounding.array()).all();
 }
 
 CellPart cell_part(double centre, double spread, std::span<const std::pair<double, double>> inside) {

@@ -2,6 +2,7 @@
 // A lattice of normal scores: where a map bends in its scores, the next state is a mixture over the lattice's cells,
 // each of which is normal; where the map fails for some scores, cells are cut at the edge.
 
+#include <Eigen/Core>
 #include <cstddef>
 #include <span>
 #include <utility>
@@ -21,6 +22,26 @@ struct LatticeAxis {
 /// @param axes  of the lattice, 1 or 2: cells of two are wider
 /// @param bent  whether cells know how the map bends within them: they may be wider then
 LatticeAxis lattice_axis(int axes, bool bent);
+
+/// Tells what a map does at all points of an axis from what it does at some of them: a polynomial through those, which
+/// are denser towards the ends.
+class AxisPolynomial {
+ public:
+  /// @param axis  of a lattice; one of few points has all of them as nodes
+  explicit AxisPolynomial(const LatticeAxis& axis);
+  const std::vector<std::size_t>& nodes() const { return nodes_; }  ///< indices of points, ascending
+  /// Returns [points x functions] what the polynomials say. @param at_nodes  [nodes x functions]
+  Eigen::MatrixXd told(const Eigen::MatrixXd& at_nodes) const { return told_ * at_nodes; }
+  /// Says whether the two highest powers of the polynomials hardly matter: neither changes any function by more than a
+  /// share of how far that moves in a unit of the score, weighed by the density of the score.
+  bool holds(const Eigen::MatrixXd& at_nodes) const;
+
+ private:
+  std::vector<std::size_t> nodes_;
+  Eigen::MatrixXd told_;     // [points x nodes]
+  Eigen::MatrixXd highest_;  // [2 points x nodes]: by the highest power and the next, weighed
+  double length_ = 0;        // of the axis
+};
 
 /// A lattice over some of a machine's scores.
 struct ScoreLattice {

@@ -1,0 +1,62 @@
+#include "analysis/machine_model/score_lattice.h"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <functional>
+
+namespace metastable::analysis {
+namespace {
+
+Eigen::MatrixXd at_nodes(const LatticeAxis& axis, const AxisPolynomial& polynomial,
+                         const std::function<double(double)>& of) {
+  Eigen::MatrixXd values(static_cast<Eigen::Index>(polynomial.nodes().size()), 1);
+  for (std::size_t k = 0; k < polynomial.nodes().size(); ++k)
+    values(static_cast<Eigen::Index>(k), 0) = of(axis.points[polynomial.nodes()[k]]);
+  return values;
+}
+
+double largest_error(const LatticeAxis& axis, const Eigen::MatrixXd& told, const std::function<double(double)>& of) {
+  double most = 0;
+  for (std::size_t p = 0; p < axis.points.size(); ++p)
+    most = std::max(most, std::abs(told(static_cast<Eigen::Index>(p), 0) - of(axis.points[p])));
+  return most;
+}
+
+TEST(AxisPolynomial, TellsAPolynomialOfLowDegreeExactly) {
+  const LatticeAxis axis = lattice_axis(1, true);
+  const AxisPolynomial polynomial(axis);
+  EXPECT_LT(polynomial.nodes().size(), axis.points.size() / 2);
+  EXPECT_EQ(polynomial.nodes()[polynomial.nodes().size() / 2], axis.points.size() / 2);  // the score of zero
+  const auto cubic = [](double z) { return 2 + z + 0.1 * z * z - 0.02 * z * z * z; };
+  const Eigen::MatrixXd values = at_nodes(axis, polynomial, cubic);
+  EXPECT_TRUE(polynomial.holds(values));
+  EXPECT_LT(largest_error(axis, polynomial.told(values), cubic), 1e-11);
+}
+
+TEST(AxisPolynomial, TellsABentMapWithinAThousandthOfAnSd) {
+  const LatticeAxis axis = lattice_axis(1, true);
+  const AxisPolynomial polynomial(axis);
+  const auto bent = [](double z) { return std::sqrt(1 + 0.15 * z); };
+  const Eigen::MatrixXd values = at_nodes(axis, polynomial, bent);
+  if (polynomial.holds(values)) EXPECT_LT(largest_error(axis, polynomial.told(values), bent), 1e-3 * 0.075);
+}
+
+TEST(AxisPolynomial, HoldsAtNoKinkWhereverItIs) {
+  const LatticeAxis axis = lattice_axis(1, true);
+  const AxisPolynomial polynomial(axis);
+  for (double kink = -2.5; kink <= 2.5; kink += 0.1) {
+    const auto broken = [kink](double z) { return z + 0.3 * std::max(0.0, z - kink); };
+    EXPECT_FALSE(polynomial.holds(at_nodes(axis, polynomial, broken))) << kink;
+  }
+}
+
+TEST(AxisPolynomial, HoldsWhereTheScoreMovesNothing) {
+  const LatticeAxis axis = lattice_axis(1, true);
+  const AxisPolynomial polynomial(axis);
+  EXPECT_TRUE(polynomial.holds(at_nodes(axis, polynomial, [](double) { return 0.27; })));
+}
+
+}  // namespace
+}  // namespace metastable::analysis
