@@ -288,7 +288,7 @@ std::string common_name(const std::vector<EffectGroup>& groups, const std::vecto
     if (std::ranges::all_of(
             alike, [&](const std::string& id) { return std::ranges::find(group.members, id) != group.members.end(); }))
       return group.name;
-  return "one and the same here";
+  return "alike in these trials";
 }
 
 bool closed_is_known(const Shrinkage& s) {

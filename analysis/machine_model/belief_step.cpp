@@ -54,7 +54,8 @@ BeliefStep<Most>::BeliefStep(MachineStepper& stepper, const ScorePlan& plan, std
     : stepper_(stepper), lattice_{plan.lattice, {}}, fails_(plan.failing.has_value()), shared_(shared), bent_(bent) {
   std::vector<std::size_t>& scores = lattice_.scores;
   if (!scores.empty()) lattice_.axis = lattice_axis(static_cast<int>(scores.size()), bent);
-  if (scores.size() == 1) axis_.emplace(lattice_.axis);
+  // Where trials may fail every point is asked: between nodes a band of scores that fail would not be seen.
+  if (scores.size() == 1 && !fails_) axis_.emplace(lattice_.axis);
   if (plan.failing && scores.front() != *plan.failing) std::swap(scores.front(), scores.back());
   for (std::size_t m = 0; m < stepper_.scores(); ++m)
     if (std::ranges::find(lattice_.scores, m) == lattice_.scores.end()) straight_.push_back(m);

@@ -74,7 +74,7 @@ class BeliefStep {
 
   MachineStepper& stepper_;
   ScoreLattice lattice_;                // its first score is the failing one
-  std::optional<AxisPolynomial> axis_;  // of a lattice over one score
+  std::optional<AxisPolynomial> axis_;  // of a lattice over one score, if no trial may fail
   bool fails_;
   std::size_t shared_;
   bool bent_;

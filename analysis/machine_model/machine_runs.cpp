@@ -189,12 +189,14 @@ std::vector<std::string> other_units(const Machine& machine, const MachineRuns& 
       if (std::isnan(seen) || std::isnan(foretold)) continue;
       if (foretold != 0) ratios.push_back(seen / foretold);
       if (const double own = variance[i * d + s] + 2 * error * error; own > 0)
-        scatters.push_back(std::abs(seen - foretold) / std::sqrt(own) / median_of_normal);
+        scatters.push_back((seen - foretold) / std::sqrt(own) / median_of_normal);
     }
     if (ratios.size() >= fewest_for_units)
       suspect(machine.observe[j].state, "its values are", median(std::move(ratios)), factor_share);
-    if (scatters.size() >= fewest_for_units)
-      suspect(machine.observe[j].state, "it scatters", median(std::move(scatters)), scatter_share);
+    if (scatters.size() < fewest_for_units) continue;
+    const double centre = median(scatters);  // an effect may move all alike
+    for (double& one : scatters) one = std::abs(one - centre);
+    suspect(machine.observe[j].state, "it scatters", median(std::move(scatters)), scatter_share);
   }
   return said;
 }

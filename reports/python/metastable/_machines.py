@@ -98,6 +98,9 @@ def _column(data, name):
         return data[name]
     except (KeyError, IndexError, ValueError):
         return None
+    except TypeError:
+        raise TypeError(f"data: anything with columns by name expected (a DataFrame, a dict of arrays), not "
+                        f"{type(data).__name__}") from None
 
 
 def _floats(values, name, rows):

@@ -171,8 +171,8 @@ TEST(Verdict, PairsAreAlikeWhereWhatTheyDoNotShareIs) {
   EXPECT_TRUE(with_pairs(0.8).causes.alike.empty());
   EXPECT_EQ(
       sentences(with_pairs(0.99)).front(),
-      "There is a gap that recalibration does not remove. These data cannot tell 3 causes apart: one and the same "
-      "here beside trial_drift (inertia, slope_offset), trial_drift+bounce.");
+      "There is a gap that recalibration does not remove. These data cannot tell 3 causes apart: alike in these "
+      "trials beside trial_drift (inertia, slope_offset), trial_drift+bounce.");
 }
 
 // An interval that reaches further up than down stays so, alone and averaged over hypotheses that say the same; where

@@ -9,6 +9,8 @@
 #include <string>
 
 #include "analysis/diagnosis/diagnosis.h"
+#include "analysis/fitting/effect_scan.h"
+#include "analysis/fitting/model_fit.h"
 #include "analysis/statistics/random.h"
 #include "dynamics/numerics/truncated_normal.h"
 #include "tests/analysis/machine_model/machines.h"
@@ -62,6 +64,24 @@ INSTANTIATE_TEST_SUITE_P(MachineTransitions, WhatWasDone,
                          testing::Values(Done{"nothing", 0, 0, 0, 0}, Done{"bend", -0.05, 0, 0, -0.05},
                                          Done{"b_drift", 0, 0.3, 0, 0.3}, Done{"b_spread", 0, 0, 0.15, 0.15}),
                          [](const auto& instance) { return std::string(instance.param.cause); });
+
+// A parameter that is 1.5 sds of its prior off is no effect: what its prior pulls on looks much like a bend.
+TEST(MachineTransitions, AParameterThatWasStatedRoughlyIsNoEffect) {
+  Machine machine = linear_machine(0.02);
+  machine.parameters = {{"a", 0.8, 0.02}, {"b", 0.3, 0}, {"s", 0.2, 0.05, 0.01, 2}};
+  const auto next = [](double x, double z, std::size_t) { return 0.77 * x + 0.3 + 0.2 * z; };
+  int significant = 0;
+  for (unsigned seed = 1; seed <= 20; ++seed) {
+    const auto model =
+        machine_transitions(std::make_shared<const Machine>(machine), scalar_runs(40, 12, 1.3, 0.02, seed, next));
+    const Candidate& bend = model->candidates().front();
+    ASSERT_EQ(bend.id, "bend");
+    const Fit recalibrated = fit(*model, given_values(*model), {});
+    const EffectScan scan = scan_effects(*model, recalibrated, {&bend}, 1);
+    significant += ChanceGains(scan, 400, seed).p_value(&bend, scan.effects.front().gain.front()) < 0.05;
+  }
+  EXPECT_LE(significant, 4);  // 1.5 sds leave one in seven beyond 2; 5 and more of 20 then come up once in 50
+}
 
 // An effect that takes the same amount off every step is a constant push of the state. Any other cause of such a push
 // would be given its name, and the answer has to say so.

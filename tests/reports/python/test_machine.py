@@ -139,7 +139,10 @@ class Refused(unittest.TestCase):
         self.check("next states of shape", asked(lambda s, z, p: (np.zeros((len(s), 2)), np.zeros(len(s), bool))), ValueError)
         self.check("(next states, failed) is to be returned", asked(lambda s, z, p: s), TypeError)
         self.check("step: no finite state comes of trial 1, row 1", asked(lambda s, z, p: (s * np.nan, np.zeros(len(s), bool))))
-        self.check("read-only", asked(writes), ValueError)
+        self.check("step: it writes into one of its arguments", asked(writes), ValueError)
+        drawn = np.random.default_rng(1)
+        self.check("step: it makes something else of the same states", asked(
+            lambda s, z, p: (p["decay"] * s + 0.01 * drawn.standard_normal(s.shape), np.zeros(len(s), bool))))
 
     def test_runs_that_are_none(self):
         machine, data = pendulum(), swung(trials=5)
@@ -148,6 +151,9 @@ class Refused(unittest.TestCase):
         self.check("swing_rad: shape (3,) given, (120,) expected", lambda: metastable.runs(machine, trial=data["trial"], swing_rad=[1, 2, 3]))
         self.check("do not stand together", lambda: metastable.runs(machine, trial=[1, 2, 1], swing_rad=[1, 2, 3]))
         self.check("\"speed\" is none of the columns", lambda: metastable.runs(machine, speed=[1], **data))
+        self.check("anything with columns by name", lambda: metastable.runs(machine, [data["trial"], data["swing_rad"]]), TypeError)
+        named = metastable.runs(machine, trial=[10, 10, 20, 20], swing_rad=[0.8, 0.7, 0.8, np.inf])
+        self.check("trial 20: a state is infinite", lambda: metastable.diagnose(named, machine))
         still = metastable.runs(machine, trial=data["trial"], swing_rad=np.ones(120))
         self.check("a column that is constant says nothing", lambda: metastable.diagnose(still, machine))
         few = metastable.runs(machine, trial=[1, 1], swing_rad=[0.8, 0.7])
