@@ -137,7 +137,7 @@ void say_explained(std::vector<std::string>& s, const Diagnosis& d) {
         fmt::format("The likeliest is {} with probability {:.2f}.", with_parameters(likeliest), likeliest.probability));
   }
   if (const double no_effect = d.causes.p_no_gap + d.causes.p_recalibrate; no_effect > 1 - d.rules.least_at_work)
-    s.push_back(fmt::format("That none acts and other {} are enough has probability {:.2f} all the same.",
+    s.push_back(fmt::format("All the same, no effect acts, and other {} are enough, with probability {:.2f}.",
                             d.gap.refitted, no_effect));
   if (!d.causes.size.empty()) s.push_back(d.causes.size);
   if (const auto left =
@@ -161,12 +161,10 @@ void say_unexplained(std::vector<std::string>& s, const Diagnosis& d) {
   const double no_effect = d.causes.p_no_gap + d.causes.p_recalibrate;
   if (no_effect > d.causes.p_none && (!any || no_effect > d.causes.ranked.front().probability)) {
     s.push_back(
-        fmt::format("There is a gap beyond chance (p = {:.2g}) that no effect of the catalogue clearly removes; "
-                    "that none acts and other {} are enough has probability {:.2f}.",
-                    d.gap.p_value, d.gap.refitted, no_effect));
-    return;
-  }
-  if (any && d.causes.ranked.front().probability > d.causes.p_none) {
+        fmt::format("A gap shows beyond chance (p = {:.2g}), and no effect of the catalogue clearly removes it. With "
+                    "probability {:.2f} no effect acts, and other {} are enough.",
+                    d.gap.p_value, no_effect, d.gap.refitted));
+  } else if (any && d.causes.ranked.front().probability > d.causes.p_none) {
     s.push_back(
         fmt::format("There is a gap that recalibration does not remove. The nearest of the catalogue is {}; "
                     "that it is none of the catalogue has probability {:.2f}, too much for a name.",

@@ -24,7 +24,8 @@ struct EffectScan {
   std::vector<ScannedEffect> effects;
   Eigen::VectorXd scores;    ///< [columns] sums of the slopes
   Eigen::MatrixXd by_trial;  ///< [trials x columns] efficient scores, summed over a trial's events
-  /// [fitted parameters x columns] by how much the scores scatter with what each one's prior states (sd)
+  /// [fitted parameters x columns] by how much the scores scatter with what each one's prior states (sd);
+  /// no rows where nuisances were not refitted
   Eigen::MatrixXd by_prior;
   Eigen::MatrixXd information;  ///< [columns x columns] efficient
   Eigen::VectorXd whole;        ///< [columns] its diagonal before the projection

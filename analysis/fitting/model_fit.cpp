@@ -6,7 +6,6 @@
 #include <iterator>
 #include <limits>
 #include <optional>
-#include <tuple>
 
 #include "markov/dense_matrix.h"
 
@@ -267,7 +266,8 @@ Eigen::MatrixXd resolved_root(const Eigen::MatrixXd& information) {
 Eigen::VectorXd prior_scatter(const TransitionModel& model, const Fit& fit) {
   std::vector<double> scatter;
   for (std::size_t p = 0; p < fit.nuisance.size(); ++p)
-    scatter.push_back(std::sqrt(model.nuisances()[p].information(fit.nuisance[p])));
+    scatter.push_back(model.nuisances()[p].prior_sd > 0 ? std::sqrt(model.nuisances()[p].information(fit.nuisance[p]))
+                                                        : 0);
   for (const EffectTerm& term : fit.terms)
     for (const FreeParameter& p : term.candidate->parameters) scatter.push_back(p.prior_sd > 0 ? 1 / p.prior_sd : 0);
   return Eigen::VectorXd::Map(scatter.data(), static_cast<Eigen::Index>(scatter.size()));
@@ -352,7 +352,8 @@ Fit fit(const TransitionModel& model, const std::vector<double>& nuisance, const
 }
 
 std::vector<double> given_values(const TransitionModel& model) {
-  constexpr int bits = 10;  // of the best value
+  constexpr int bits = 10, most_passes = 10;  // of the best value; over all that were assumed
+  int passes = 0;
   std::vector<double> values = nominal_values(model);
   const auto assumed = std::ranges::count_if(model.nuisances(), &Nuisance::assumed);
   double last = std::numeric_limits<double>::infinity(), now = last;
@@ -361,13 +362,19 @@ std::vector<double> given_values(const TransitionModel& model) {
     for (std::size_t p = 0; p < values.size(); ++p) {
       const Nuisance& n = model.nuisances()[p];
       if (!n.assumed) continue;
+      const double held = values[p];
       const auto cost = [&](double value) {
         values[p] = value;
-        return n.cost(value) - model.evaluate(values, {}).total();
+        double sum = -model.evaluate(values, {}).total();
+        for (std::size_t q = 0; q < values.size(); ++q)
+          if (model.nuisances()[q].assumed) sum += model.nuisances()[q].cost(values[q]);
+        return sum;
       };
-      std::tie(values[p], now) = boost::math::tools::brent_find_minima(cost, n.lower, n.upper, bits);
+      const auto [best, least] = boost::math::tools::brent_find_minima(cost, n.lower, n.upper, bits);
+      values[p] = least < now ? best : held;
+      now = std::min(now, least);
     }
-  } while (assumed > 1 && now < last - unresolved);
+  } while (assumed > 1 && now < last - unresolved && ++passes < most_passes);
   return values;
 }
 

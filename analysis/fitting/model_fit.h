@@ -64,7 +64,8 @@ struct FitOptions {
 Fit fit(const TransitionModel& model, const std::vector<double>& nuisance, const std::vector<EffectTerm>& terms,
         const FitOptions& options = {});
 
-/// Returns the nuisances of the model as given: nominal values, those that were only assumed at their best beside them.
+/// Returns the nuisances of the model as given: nominal values, those that were only assumed at their best
+/// beside them, together.
 std::vector<double> given_values(const TransitionModel& model);
 
 /// Returns the better of the fits from the given values and from the model's own starts (TransitionModel::starts).
@@ -80,7 +81,7 @@ Derivatives derivatives(const TransitionModel& model, const std::vector<double>&
 Eigen::MatrixXd information(const Derivatives& columns, const Evaluation& here, const Eigen::VectorXd& weights);
 
 /// Returns by how much the prior's slope at each fitted parameter of a fit, nuisances first, scatters with what is
-/// stated (sd): as one over the prior's sd; 0 without a prior.
+/// stated (sd): the root of the prior's information; 0 without a prior.
 Eigen::VectorXd prior_scatter(const TransitionModel& model, const Fit& fit);
 
 /// Returns 1 or 0 an event. @param count  by trial; empty: all ones

@@ -95,10 +95,12 @@ void standardise(std::vector<GapCell>& cells, const std::vector<MapColumn>& colu
   }
 }
 
-// Takes the columns around their means, of norm 1: sums of rows times normals are statistics by chance.
-Eigen::MatrixXd centred(const Eigen::MatrixXd& rows) {
+// Takes the columns of `rows` around their means, so that a gap does not count as chance, with what the priors let
+// scatter, and of norm 1: sums of rows times normals are statistics by chance.
+Eigen::MatrixXd drawn_anew(const Eigen::MatrixXd& rows, const Eigen::MatrixXd& by_prior) {
   const Eigen::RowVectorXd mean = rows.colwise().mean();
-  Eigen::MatrixXd all = rows.rowwise() - mean;
+  Eigen::MatrixXd all(rows.rows() + by_prior.rows(), rows.cols());
+  all << rows.rowwise() - mean, by_prior;
   for (Eigen::Index c = 0; c < all.cols(); ++c) {
     const double norm = all.col(c).norm();
     if (norm > 0 && std::isfinite(norm))
@@ -185,9 +187,7 @@ GapMap gap_map(const TransitionModel& model, const Fit& fit, int draws, std::uin
   std::vector<double> sizes;
   for (const GapCell& cell : map.cells) sizes.push_back(std::abs(cell.statistic));
   const std::vector<std::size_t> order = falling_order(sizes);
-  Eigen::MatrixXd drawn(units.rows.rows() + efficient.by_prior.rows(), units.rows.cols());
-  drawn << units.rows, efficient.by_prior;
-  step_down(map.cells, order, centred(drawn), draws, seed);
+  step_down(map.cells, order, drawn_anew(units.rows, efficient.by_prior), draws, seed);
   discover(map.cells, order);
   for (const GapCell& cell : map.cells) map.p_value = std::min(map.p_value, cell.p_adjusted);
   return map;

@@ -68,11 +68,12 @@ HeldOutGap gap_shrinkage(const TransitionModel& model, const Fit& given, const F
 double gap_by_itself(const TransitionModel& model, const Fit& chosen, int folds, int threads, std::uint64_t seed,
                      const std::function<void()>& heartbeat = {});
 
-/// Compares the share of collisions that led to rest, model against observed, by what the models expect in steps before
-/// failure. Rests are counts, so intervals are those of a Poisson mean (exact, 90 %), and the floor is the mean
-/// deviation of such a count from the last model's own expectation. All trials count: rests are too few to hold any
-/// out.
-/// @param at_risk, rests  observed; at_risk > 0
+/// Compares the share of steps that end a trial (a wheel's collisions that rest), model against observed, by what the
+/// models expect in steps before failure. They are counts, so intervals are those of a Poisson mean (exact, 90 %), and
+/// the floor is the mean deviation of such a count from the last model's own expectation. All trials count: such steps
+/// are too few to hold any out.
+/// @param at_risk, rests  steps observed, and those of them that ended a trial; at_risk > 0
+/// @param measure  its name in the table
 Shrinkage rest_shrinkage(double at_risk, double rests, const StepsBeforeFailure& steps, const std::string& measure);
 
 }  // namespace metastable::analysis

@@ -64,6 +64,7 @@ struct EfficientColumns {
   Eigen::MatrixXd by_prior;       // [fitted parameters x columns] by how much each one's prior lets the sums scatter
 };
 
+/// @param fit  that refitted the nuisances, or has no derivatives
 EfficientColumns project(const std::vector<MapColumn>& columns, const TransitionModel& model, const Fit& fit);
 
 }  // namespace metastable::analysis

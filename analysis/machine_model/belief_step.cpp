@@ -54,7 +54,7 @@ BeliefStep<Most>::BeliefStep(MachineStepper& stepper, const ScorePlan& plan, std
     : stepper_(stepper), lattice_{plan.lattice, {}}, fails_(plan.failing.has_value()), shared_(shared), bent_(bent) {
   std::vector<std::size_t>& scores = lattice_.scores;
   if (!scores.empty()) lattice_.axis = lattice_axis(static_cast<int>(scores.size()), bent);
-  // Where trials may fail every point is asked: between nodes a band of scores that fail would not be seen.
+  // Where trials may fail every point is asked: between them a band of scores that fail would not be seen.
   if (scores.size() == 1 && !fails_) axis_.emplace(lattice_.axis);
   if (plan.failing && scores.front() != *plan.failing) std::swap(scores.front(), scores.back());
   for (std::size_t m = 0; m < stepper_.scores(); ++m)
@@ -100,42 +100,42 @@ std::size_t BeliefStep<Most>::centre_of(std::size_t trial) const {
   return lattice_.scores.empty() ? trial * points_ : lattice_start(trial) + lattice_.points() / 2;
 }
 
-// Says whether a point of a lattice over one score is none of the nodes that tell the others.
+// Says whether a point of a lattice over one score is none of those that tell the others.
 template <int Most>
-bool BeliefStep<Most>::between_nodes(std::size_t point) const {
+bool BeliefStep<Most>::not_asked(std::size_t point) const {
   const std::size_t at = point % points_, first = lattice_start(0);
-  return at >= first && at < first + lattice_.points() && !std::ranges::binary_search(axis_->nodes(), at - first);
+  return at >= first && at < first + lattice_.points() && !std::ranges::binary_search(axis_->asked(), at - first);
 }
 
-// Tells the points of a trial's lattice from its nodes. Returns whether a polynomial holds there: it does not where a
+// Tells the points of a trial's lattice from those asked. Returns whether a polynomial holds there: it does not where a
 // point failed.
 template <int Most>
 bool BeliefStep<Most>::told(std::size_t trial) {
-  const std::vector<std::size_t>& nodes = axis_->nodes();
+  const std::vector<std::size_t>& asked = axis_->asked();
   const std::size_t start = lattice_start(trial);
   for (std::size_t point = trial * points_; point < (trial + 1) * points_; ++point)
-    if (!between_nodes(point) && stepper_.failed(point)) return false;
-  Eigen::MatrixXd at_nodes(static_cast<Eigen::Index>(nodes.size()), states());
-  for (std::size_t k = 0; k < nodes.size(); ++k)
-    at_nodes.row(static_cast<Eigen::Index>(k)) = stepper_.next(start + nodes[k]).transpose();
-  if (!axis_->holds(at_nodes)) return false;
-  const Eigen::MatrixXd all = axis_->told(at_nodes);
+    if (!not_asked(point) && stepper_.failed(point)) return false;
+  Eigen::MatrixXd at_asked(static_cast<Eigen::Index>(asked.size()), states());
+  for (std::size_t k = 0; k < asked.size(); ++k)
+    at_asked.row(static_cast<Eigen::Index>(k)) = stepper_.next(start + asked[k]).transpose();
+  if (!axis_->holds(at_asked)) return false;
+  const Eigen::MatrixXd all = axis_->told(at_asked);
   for (std::size_t p = 0; p < lattice_.points(); ++p)
-    if (between_nodes(start + p)) stepper_.tell(start + p, all.row(static_cast<Eigen::Index>(p)).transpose());
+    if (not_asked(start + p)) stepper_.tell(start + p, all.row(static_cast<Eigen::Index>(p)).transpose());
   return true;
 }
 
-// Steps all points, of a lattice over one score first the nodes, and the others where these do not tell them.
+// Steps all points, of a lattice over one score first some, and the others where these do not tell them.
 template <int Most>
 void BeliefStep<Most>::run_points(std::size_t trials) {
   if (!axis_) return stepper_.run();
   std::vector<std::size_t> asked, others;
   for (std::size_t point = 0; point < trials * points_; ++point)
-    if (!between_nodes(point)) asked.push_back(point);
+    if (!not_asked(point)) asked.push_back(point);
   stepper_.run(asked);
   for (std::size_t t = 0; t < trials; ++t)
     for (std::size_t p = told(t) ? points_ : 0; p < points_; ++p)
-      if (between_nodes(t * points_ + p)) others.push_back(t * points_ + p);
+      if (not_asked(t * points_ + p)) others.push_back(t * points_ + p);
   if (!others.empty()) stepper_.run(others);
 }
 

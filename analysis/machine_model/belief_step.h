@@ -36,7 +36,7 @@ class BeliefStep {
   /// @param shared  sensors that share errors between rows
   /// @param bent    parts stay bent in the scores of the lattice, which then are the last numbers of the vector
   BeliefStep(MachineStepper& stepper, const ScorePlan& plan, std::size_t shared, bool bent);
-  /// Steps beliefs, all in one call of the machine's map, and hands on what comes of each, in their order.
+  /// Steps beliefs, all in one or two calls of the machine's map, and hands on what comes of each, in their order.
   /// @param take  is given the number of the belief and its distribution after the step, which it may change
   void step(std::span<const TransitionPlace> places, std::span<const Part> beliefs,
             const std::function<void(std::size_t, AfterStep<Most>&)>& take);
@@ -55,7 +55,7 @@ class BeliefStep {
   double beside() const;
   void add_points(const TransitionPlace& place, const Part& belief, const Matrix& root);
   void run_points(std::size_t trials);
-  bool between_nodes(std::size_t point) const;
+  bool not_asked(std::size_t point) const;
   bool told(std::size_t trial);
   Matrix first_differences(std::size_t at, const Vector* centre, Matrix& bend) const;
   Matrix mixed_differences(std::size_t trial, std::size_t axis) const;

@@ -24,10 +24,10 @@ constexpr UnitFactor unit_factors[]{{180 / std::numbers::pi, "degrees where the 
                                     {std::numbers::pi / 180, "radians where the machine has degrees"},
                                     {1000, "thousandths of the machine's unit"},
                                     {0.001, "thousands of the machine's unit"}};
-constexpr double factor_share = 0.15, scatter_share = 0.5;  // of the logarithm; what scatters is known roughly
-constexpr double same_share = 1e-6;                         // of a state, asked for twice
-constexpr std::size_t fewest_for_units = 10;                // rows
-constexpr double median_of_normal = 0.6744897501960817;     // of the size of a standard normal
+constexpr double values_apart = 0.15, scatters_apart = 0.5;  // of logarithms; scatter is known roughly
+constexpr double same_share = 1e-6;                          // of the largest value of a state, asked for twice
+constexpr std::size_t fewest_for_units = 10;                 // rows
+constexpr double median_of_normal = 0.6744897501960817;      // of the size of a standard normal
 
 template <class Known>
 bool every_row(const MachineRuns& runs, Known known) {
@@ -36,22 +36,18 @@ bool every_row(const MachineRuns& runs, Known known) {
   });
 }
 
-std::string name_of(const MachineRuns& runs, std::size_t t) {
-  return runs.trials[t].name.empty() ? std::to_string(t + 1) : runs.trials[t].name;
-}
-
 void require_shape(const Machine& machine, const MachineRuns& runs) {
   for (std::size_t t = 0; t < runs.trials.size(); ++t)
     for (const MachineRow& row : runs.trials[t].rows) {
       if (row.seen.size() != machine.observe.size() || row.inputs.size() != machine.inputs.size())
         throw std::invalid_argument(fmt::format("trial {}: a row has {} states and {} inputs where {} and {} belong",
-                                                name_of(runs, t), row.seen.size(), row.inputs.size(),
+                                                runs.name_of(t), row.seen.size(), row.inputs.size(),
                                                 machine.observe.size(), machine.inputs.size()));
       if (std::ranges::any_of(row.seen, [](double x) { return std::isinf(x); }))
-        throw std::invalid_argument(fmt::format("trial {}: a state is infinite", name_of(runs, t)));
+        throw std::invalid_argument(fmt::format("trial {}: a state is infinite", runs.name_of(t)));
       const bool steps = &row != &runs.trials[t].rows.back() || runs.trials[t].outcome == MachineOutcome::failed;
       if (steps && !std::ranges::all_of(row.inputs, [](double x) { return std::isfinite(x); }))
-        throw std::invalid_argument(fmt::format("trial {}: an input is not a finite number", name_of(runs, t)));
+        throw std::invalid_argument(fmt::format("trial {}: an input is not a finite number", runs.name_of(t)));
     }
 }
 
@@ -71,7 +67,7 @@ void require_launch(const Machine& machine, const MachineRuns& runs) {
         throw std::invalid_argument(
             fmt::format("launch: trial {} begins without {}, so that its first value has to be "
                         "given with its sd",
-                        name_of(runs, t), state));
+                        runs.name_of(t), state));
   }
 }
 
@@ -154,19 +150,28 @@ std::vector<double> stepped(const Machine& machine, const NominalSteps& from, st
   return next;
 }
 
+// Refuses a map that makes something else of the same rows when it is asked again.
+void require_same(const std::vector<double>& once, const std::vector<double>& again, std::size_t states) {
+  std::vector<double> largest(states, 0.0);
+  for (std::size_t i = 0; i < once.size(); ++i)
+    if (std::isfinite(once[i])) largest[i % states] = std::max(largest[i % states], std::abs(once[i]));
+  for (std::size_t i = 0; i < once.size(); ++i)
+    if (std::isfinite(once[i]) != std::isfinite(again[i]) ||
+        std::abs(once[i] - again[i]) > same_share * largest[i % states])
+      throw std::invalid_argument(
+          "step: it makes something else of the same states and noise when it is asked again; it must be a function of "
+          "its arguments alone, and take what it draws from the noise");
+}
+
 // Puts the measured next values beside those of the nominal map, and what lies between beside its noise, and asks
 // whether one is a unit's factor of the other.
 std::vector<std::string> other_units(const Machine& machine, const MachineRuns& runs) {
   const NominalSteps from = nominal_steps(machine, runs);
   const std::size_t rows = from.after.size(), d = machine.states.size();
+  if (rows == 0) return {};
+  const std::vector<double> middle = stepped(machine, from, 0, 0);
+  require_same(middle, stepped(machine, from, 0, 0), d);
   if (rows < fewest_for_units) return {};
-  const std::vector<double> middle = stepped(machine, from, 0, 0), again = stepped(machine, from, 0, 0);
-  for (std::size_t i = 0; i < middle.size(); ++i)
-    if (std::isnan(middle[i]) != std::isnan(again[i]) ||
-        std::abs(middle[i] - again[i]) > same_share * std::abs(middle[i]))
-      throw std::invalid_argument(
-          "step: it makes something else of the same states and noise when it is asked again; it must be a function of "
-          "its arguments alone, and take what it draws from the noise");
   std::vector<double> variance(middle.size(), 0.0);
   for (std::size_t m = 0; m < static_cast<std::size_t>(machine.scores); ++m) {
     const std::vector<double> up = stepped(machine, from, m, 1), down = stepped(machine, from, m, -1);
@@ -174,9 +179,9 @@ std::vector<std::string> other_units(const Machine& machine, const MachineRuns& 
       if (std::isfinite(up[i]) && std::isfinite(down[i])) variance[i] += 0.25 * (up[i] - down[i]) * (up[i] - down[i]);
   }
   std::vector<std::string> said;
-  const auto suspect = [&](const std::string& state, const char* what, double ratio, double share) {
+  const auto suspect = [&](const std::string& state, const char* what, double ratio, double apart) {
     for (const UnitFactor& unit : unit_factors)
-      if (std::abs(std::log(std::abs(ratio) / unit.factor)) < share)
+      if (std::abs(std::log(std::abs(ratio) / unit.factor)) < apart)
         said.push_back(fmt::format("{}: {} {:.3g} times what the machine makes of the rows before: is it in {}?", state,
                                    what, ratio, unit.words));
   };
@@ -192,11 +197,11 @@ std::vector<std::string> other_units(const Machine& machine, const MachineRuns& 
         scatters.push_back((seen - foretold) / std::sqrt(own) / median_of_normal);
     }
     if (ratios.size() >= fewest_for_units)
-      suspect(machine.observe[j].state, "its values are", median(std::move(ratios)), factor_share);
+      suspect(machine.observe[j].state, "its values are", median(std::move(ratios)), values_apart);
     if (scatters.size() < fewest_for_units) continue;
     const double centre = median(scatters);  // an effect may move all alike
     for (double& one : scatters) one = std::abs(one - centre);
-    suspect(machine.observe[j].state, "it scatters", median(std::move(scatters)), scatter_share);
+    suspect(machine.observe[j].state, "it scatters", median(std::move(scatters)), scatters_apart);
   }
   return said;
 }
@@ -211,6 +216,10 @@ std::size_t MachineRuns::transitions() const {
   std::size_t count = 0;
   for (const MachineTrial& trial : trials) count += trial.rows.empty() ? 0 : trial.rows.size() - 1;
   return count;
+}
+
+std::string MachineRuns::name_of(std::size_t trial) const {
+  return trials[trial].name.empty() ? std::to_string(trial + 1) : trials[trial].name;
 }
 
 std::size_t MachineRuns::longest() const {
@@ -254,8 +263,9 @@ std::vector<std::string> look_over(const Machine& machine, const MachineRuns& ru
   for (std::size_t j = 0; j < machine.observe.size(); ++j) {
     const std::vector<double> values = column(runs, j);
     if (values.size() < 2)
-      throw std::invalid_argument(fmt::format("runs: {} has {}: every row else misses it", machine.observe[j].state,
-                                              values.empty() ? "no value" : "one value"));
+      throw std::invalid_argument(
+          fmt::format("runs: {} has {}", machine.observe[j].state,
+                      values.empty() ? "no value in any row" : "one value; every other row lacks it"));
     const auto [least, most] = std::ranges::minmax(values);
     if (least == most)
       throw std::invalid_argument(fmt::format("runs: {} is {} in every row: a column that is constant says nothing",

@@ -54,9 +54,10 @@ class MachineStepper {
            const Eigen::Ref<const Eigen::VectorXd>& fresh);
   /// Steps all points added. A state that is not finite counts as failed.
   void run();
-  /// Steps some of the points added; what is known of the others stays.
+  /// Steps some of the points added, by their numbers from 0; what is known of the others stays. What was never stepped
+  /// nor told has no next state.
   void run(std::span<const std::size_t> points);
-  /// Takes the next state of a point that did not fail from elsewhere.
+  /// Takes the next state [states()], pushes and all, of a point that was not stepped and would not fail.
   void tell(std::size_t point, const Eigen::Ref<const Eigen::VectorXd>& next);
   /// Says whether it counts as failed for want of a finite state alone.
   bool lost(std::size_t point) const;

@@ -3,6 +3,7 @@
 #include <Eigen/LU>
 #include <algorithm>
 #include <cmath>
+#include <iterator>
 #include <numbers>
 
 #include "dynamics/numerics/truncated_normal.h"
@@ -18,11 +19,12 @@ constexpr double spacing_share = 0.92;
 struct CellSize {
   double spread, reach;
 };
-// Nodes of an axis from which its other points are told, the share of a unit's move by which the highest powers may
-// matter, and the width of the weights exp(-z^2 / width) of the points.
-constexpr int most_nodes = 9;
-constexpr double told_share = 1e-4, told_width = 8, told_rounding = 1e-12;
 constexpr CellSize fine{0.4, 5.6}, for_bent{0.5, 4.7}, on_two_axes{0.7, 4.7};
+// Nodes of an axis from which its other points are told, the spacings of a gap between them that is wide, the share of
+// a unit's move by which a polynomial may be off, and the width of the weights exp(-z^2 / width) of the points.
+constexpr int most_nodes = 9;
+constexpr std::size_t wide_gap = 4;
+constexpr double told_share = 1e-4, told_width = 8, told_rounding = 1e-12;
 
 }  // namespace
 
@@ -51,36 +53,53 @@ LatticeAxis lattice_axis(int axes, bool bent) {
 AxisPolynomial::AxisPolynomial(const LatticeAxis& axis) {
   const std::size_t n = axis.points.size();
   const auto last = static_cast<double>(n - 1);
+  std::vector<std::size_t> nodes, gaps;
   for (int k = 0; k < most_nodes; ++k) {
     const double share = 0.5 - 0.5 * std::cos(std::numbers::pi * k / (most_nodes - 1));
     const auto node = static_cast<std::size_t>(std::lround(share * last));
-    if (nodes_.empty() || nodes_.back() < node) nodes_.push_back(node);
+    if (!nodes.empty() && nodes.back() == node) continue;
+    if (!nodes.empty() && node - nodes.back() >= wide_gap) gaps.push_back((nodes.back() + node) / 2);
+    nodes.push_back(node);
   }
+  std::ranges::merge(nodes, gaps, std::back_inserter(asked_));
+  const auto place = [&](std::size_t point) { return std::ranges::lower_bound(asked_, point) - asked_.begin(); };
   length_ = axis.points.back() - axis.points.front();
-  const auto count = static_cast<Eigen::Index>(nodes_.size()), points = static_cast<Eigen::Index>(n);
+  const auto count = static_cast<Eigen::Index>(nodes.size()), points = static_cast<Eigen::Index>(n);
   const auto basis = [&](std::size_t point) {
     Eigen::RowVectorXd row(count);
     const double angle = std::acos(std::clamp(2 * (axis.points[point] - axis.points.front()) / length_ - 1, -1.0, 1.0));
     for (Eigen::Index power = 0; power < count; ++power) row[power] = std::cos(static_cast<double>(power) * angle);
     return row;
   };
-  Eigen::MatrixXd at_nodes(count, count), at_points(points, count);
-  for (Eigen::Index k = 0; k < count; ++k) at_nodes.row(k) = basis(nodes_[static_cast<std::size_t>(k)]);
+  const auto weight = [&](std::size_t point) {
+    return std::exp(-axis.points[point] * axis.points[point] / told_width);
+  };
+  Eigen::MatrixXd at_nodes(count, count), at_points(points, count),
+      chosen = Eigen::MatrixXd::Zero(count, static_cast<Eigen::Index>(asked_.size()));
+  for (Eigen::Index k = 0; k < count; ++k) {
+    at_nodes.row(k) = basis(nodes[static_cast<std::size_t>(k)]);
+    chosen(k, place(nodes[static_cast<std::size_t>(k)])) = 1;
+  }
   for (Eigen::Index p = 0; p < points; ++p) at_points.row(p) = basis(static_cast<std::size_t>(p));
-  const Eigen::MatrixXd coefficients = at_nodes.partialPivLu().inverse();
+  const Eigen::MatrixXd coefficients = at_nodes.partialPivLu().solve(chosen);  // [powers x asked]
   told_ = at_points * coefficients;
-  highest_.resize(2 * points, count);
-  for (Eigen::Index p = 0; p < points; ++p) {
-    const double z = axis.points[static_cast<std::size_t>(p)], weight = std::exp(-z * z / told_width);
+  off_.resize(2 * points + static_cast<Eigen::Index>(gaps.size()), chosen.cols());
+  for (Eigen::Index p = 0; p < points; ++p)
     for (Eigen::Index power = 0; power < 2; ++power)
-      highest_.row(2 * p + power) = weight * at_points(p, count - 1 - power) * coefficients.row(count - 1 - power);
+      off_.row(2 * p + power) =
+          weight(static_cast<std::size_t>(p)) * at_points(p, count - 1 - power) * coefficients.row(count - 1 - power);
+  for (std::size_t g = 0; g < gaps.size(); ++g) {
+    auto row = off_.row(2 * points + static_cast<Eigen::Index>(g));
+    row = told_.row(static_cast<Eigen::Index>(gaps[g]));
+    row[place(gaps[g])] -= 1;
+    row *= weight(gaps[g]);
   }
 }
 
-bool AxisPolynomial::holds(const Eigen::MatrixXd& at_nodes) const {
-  const Eigen::RowVectorXd most = (highest_ * at_nodes).cwiseAbs().colwise().maxCoeff();
-  const Eigen::RowVectorXd moves = (at_nodes.bottomRows<1>() - at_nodes.topRows<1>()).cwiseAbs() / length_;
-  const Eigen::RowVectorXd rounding = told_rounding * at_nodes.cwiseAbs().colwise().maxCoeff();
+bool AxisPolynomial::holds(const Eigen::MatrixXd& at_asked) const {
+  const Eigen::RowVectorXd most = (off_ * at_asked).cwiseAbs().colwise().maxCoeff();
+  const Eigen::RowVectorXd moves = (at_asked.bottomRows<1>() - at_asked.topRows<1>()).cwiseAbs() / length_;
+  const Eigen::RowVectorXd rounding = told_rounding * at_asked.cwiseAbs().colwise().maxCoeff();
   return (most.array() <= told_share * moves.array() + rounding.array()).all();
 }
 

@@ -23,24 +23,25 @@ struct LatticeAxis {
 /// @param bent  whether cells know how the map bends within them: they may be wider then
 LatticeAxis lattice_axis(int axes, bool bent);
 
-/// Tells what a map does at all points of an axis from what it does at some of them: a polynomial through those, which
-/// are denser towards the ends.
+/// Tells what a map does at all points of an axis from what it does at some of them: a polynomial through nodes, which
+/// are denser towards the ends, held against what the map does in the middle of the widest gaps between them.
 class AxisPolynomial {
  public:
-  /// @param axis  of a lattice; one of few points has all of them as nodes
+  /// @param axis  of a lattice, of two points or more
   explicit AxisPolynomial(const LatticeAxis& axis);
-  const std::vector<std::size_t>& nodes() const { return nodes_; }  ///< indices of points, ascending
-  /// Returns [points x functions] what the polynomials say. @param at_nodes  [nodes x functions]
-  Eigen::MatrixXd told(const Eigen::MatrixXd& at_nodes) const { return told_ * at_nodes; }
-  /// Says whether the two highest powers of the polynomials hardly matter: neither changes any function by more than a
-  /// share of how far that moves in a unit of the score, weighed by the density of the score.
-  bool holds(const Eigen::MatrixXd& at_nodes) const;
+  const std::vector<std::size_t>& asked() const { return asked_; }  ///< indices of points, ascending
+  /// Returns [points x functions] what the polynomials say. @param at_asked  [points asked x functions]
+  Eigen::MatrixXd told(const Eigen::MatrixXd& at_asked) const { return told_ * at_asked; }
+  /// Says whether polynomials do: neither their two highest powers matter anywhere, nor are they off in a gap, by more
+  /// than a ten-thousandth of how far the function moves in a unit of the score from end to end, weighed by
+  /// exp(-z^2 / 8), or than rounding. A function with the same value at both ends, and another between, has none.
+  bool holds(const Eigen::MatrixXd& at_asked) const;
 
  private:
-  std::vector<std::size_t> nodes_;
-  Eigen::MatrixXd told_;     // [points x nodes]
-  Eigen::MatrixXd highest_;  // [2 points x nodes]: by the highest power and the next, weighed
-  double length_ = 0;        // of the axis
+  std::vector<std::size_t> asked_;
+  Eigen::MatrixXd told_;  // [points x asked]
+  Eigen::MatrixXd off_;   // [what must be small x asked]: highest powers at each point, and gaps, weighed
+  double length_ = 0;     // of the axis
 };
 
 /// A lattice over some of a machine's scores.

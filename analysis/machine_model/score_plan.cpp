@@ -138,8 +138,8 @@ ScorePlan score_plan(const Machine& machine, const MachineRuns& runs, const Mach
   std::size_t went_on = 0, lost = 0, last_lost = 0;
   for (std::size_t i = 0; i < states.size(); ++i) {
     if (stepper.lost(i * tried.size()))
-      throw std::invalid_argument(
-          fmt::format("step: no finite state comes of trial {}, row {}", places[i].trial + 1, places[i].row + 1));
+      throw std::invalid_argument(fmt::format("step: no finite state comes of trial {}, row {}",
+                                              runs.name_of(places[i].trial), places[i].row + 1));
     look(told, stepper, i * tried.size(), scale);
     if (places[i].row + 1 == runs.trials[places[i].trial].rows.size()) continue;
     ++went_on;
@@ -151,7 +151,7 @@ ScorePlan score_plan(const Machine& machine, const MachineRuns& runs, const Mach
     throw std::invalid_argument(
         fmt::format("step: fails without noise from {} of {} rows that went on, as from trial {}, "
                     "row {}",
-                    lost, went_on, places[last_lost].trial + 1, places[last_lost].row + 1));
+                    lost, went_on, runs.name_of(places[last_lost].trial), places[last_lost].row + 1));
   return planned(told, std::ranges::any_of(runs.trials, [](const MachineTrial& trial) {
                    return trial.outcome == MachineOutcome::failed;
                  }));

@@ -98,7 +98,8 @@ class WalkReader {
         return csv.refuse(trial_, fmt::format("the rows of trial {} do not stand together", key.second));
       auto at = std::ranges::find(runs_.conditions, key.first);
       if (at == runs_.conditions.end()) at = runs_.conditions.insert(at, key.first);
-      runs_.trials.push_back({static_cast<std::size_t>(at - runs_.conditions.begin()), {}, {}});
+      runs_.trials.push_back(
+          {static_cast<std::size_t>(at - runs_.conditions.begin()), {}, {}, fmt::format("{}", key.second)});
       last_ = key;
     }
     std::vector<MachineRow>& rows = runs_.trials.back().rows;

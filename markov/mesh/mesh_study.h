@@ -75,7 +75,7 @@ struct MeshStudy {
   std::string no_guided, no_simulated;
   /// Holds what was simulated where too few walks fail for an estimate: it may refute the mesh and confirms little.
   std::optional<FailureCount> walks;
-  /// Empty, or a clause that says why `steps` must not be used: which ways disagree.
+  /// Empty, or a clause that says why `steps` must not be used: which ways disagree, or that meshes do not converge.
   std::string disagreement;
 };
 
@@ -94,6 +94,7 @@ class Disagreement : public std::runtime_error {
 /// Says that other ways contradict a mesh, or that it does not converge: a way without a mesh may have a number.
 class RefutedMesh : public Disagreement {
  public:
+  /// @param what  was studied @param why  a clause, as MeshStudy::disagreement @param instead  what could be done
   RefutedMesh(const std::string& what, std::string why, const std::string& instead = "")
       : Disagreement(what + ": " + why + ": no number is given" + instead), why_(std::move(why)) {}
   const std::string& why() const { return why_; }  ///< a clause
@@ -142,7 +143,7 @@ MeshStudy mesh_study(const BatchMap& map, std::span<const double> start, const M
 std::string disagreement(const char* one, const MeshEstimate& a, const char* other, const MeshEstimate& b);
 
 /// @param what  was studied, for the message
-/// @throws RefutedMesh with MeshStudy::disagreement, unless that is empty
+/// @throws RefutedMesh with MeshStudy::disagreement as its why(), unless that is empty
 void require_agreement(const MeshStudy& study, const std::string& what);
 
 }  // namespace metastable::markov

@@ -57,8 +57,11 @@ py::object call_step(const std::function<py::object()>& step) {
   } catch (py::error_already_set& error) {
     const std::string said = py::str(error.value());
     if (error.matches(PyExc_ValueError) && said.find("read-only") != std::string::npos)
-      throw py::value_error("step: it writes into one of its arguments, which it may not (" + said + ")");
-    throw;
+      py::raise_from(error, PyExc_ValueError,
+                     ("step: it writes into a read-only array, as its arguments are (" + said + ")").c_str());
+    else
+      throw;
+    throw py::error_already_set();
   }
 }
 

@@ -183,7 +183,8 @@ class Runs:
         self.rows = rows
         self._columns = tuple(machine.sensor), machine.inputs
         self._laid_out = dict(
-            trial=index, trial_names=[str(name) for name in numpy.asarray(trial)[first]] if rows else [], seen=numpy.column_stack(seen) if rows else numpy.zeros((0, len(seen))),
+            trial=index, trial_names=self._names(numpy.asarray(trial)[first], condition[first], conditions) if rows else [],
+            seen=numpy.column_stack(seen) if rows else numpy.zeros((0, len(seen))),
             time=optional["time_s"], position=optional["position_m"], phase=phase, phases=phases,
             conditions=conditions, trial_condition=condition[first] if rows else numpy.zeros(0, int), labels=label_values,
             label_index=numpy.column_stack(label_index) if label_index else numpy.zeros((rows, 0), int),
@@ -205,6 +206,11 @@ class Runs:
             index[at] = seen.setdefault(key, len(seen))
             before = key
         return index
+
+    @staticmethod
+    def _names(trial, condition, conditions):
+        """What messages call the trials: as their user does, with the condition where there are several."""
+        return [f"{name} of {conditions[at]}" if len(conditions) > 1 else str(name) for name, at in zip(trial, condition)]
 
     def _outcomes(self, outcome, names):
         if outcome is None:

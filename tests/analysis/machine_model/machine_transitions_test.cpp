@@ -80,7 +80,8 @@ TEST(MachineTransitions, AParameterThatWasStatedRoughlyIsNoEffect) {
     const EffectScan scan = scan_effects(*model, recalibrated, {&bend}, 1);
     significant += ChanceGains(scan, 400, seed).p_value(&bend, scan.effects.front().gain.front()) < 0.05;
   }
-  EXPECT_LE(significant, 4);  // 1.5 sds leave one in seven beyond 2; 5 and more of 20 then come up once in 50
+  // 15 are without the priors. With them the score lies at most 1.5 sds off, and scatters little beside.
+  EXPECT_LE(significant, 4);
 }
 
 // An effect that takes the same amount off every step is a constant push of the state. Any other cause of such a push

@@ -138,8 +138,8 @@ class Refused(unittest.TestCase):
 
         self.check("next states of shape", asked(lambda s, z, p: (np.zeros((len(s), 2)), np.zeros(len(s), bool))), ValueError)
         self.check("(next states, failed) is to be returned", asked(lambda s, z, p: s), TypeError)
-        self.check("step: no finite state comes of trial 1, row 1", asked(lambda s, z, p: (s * np.nan, np.zeros(len(s), bool))))
-        self.check("step: it writes into one of its arguments", asked(writes), ValueError)
+        self.check("step: no finite state comes of trial 0, row 1", asked(lambda s, z, p: (s * np.nan, np.zeros(len(s), bool))))
+        self.check("step: it writes into a read-only array, as its arguments are", asked(writes), ValueError)
         drawn = np.random.default_rng(1)
         self.check("step: it makes something else of the same states", asked(
             lambda s, z, p: (p["decay"] * s + 0.01 * drawn.standard_normal(s.shape), np.zeros(len(s), bool))))
