@@ -201,11 +201,12 @@ struct Diagnosis {
   struct Data {
     std::size_t trials = 0, collisions = 0, events = 0;
     std::vector<std::string> condition_names;
-    std::string step_name = "step";                             ///< TransitionModel::step_name()
-    bool collides() const { return step_name == "collision"; }  ///< it is a wheel, whose trials end at rest
-    std::vector<EffectGroup> groups;                            ///< TransitionModel::groups()
-    std::vector<std::string> notes;  ///< what is not known, was assumed or is rough, a sentence each
-    std::string accepted_defects;    ///< TransitionModel::accepted_defects(), which the verdict repeats
+    std::string step_name = "step";   ///< TransitionModel::step_name()
+    std::vector<EffectGroup> groups;  ///< TransitionModel::groups()
+    std::vector<std::string> notes;   ///< what is not known, was assumed or is rough, a sentence each
+    std::string accepted_defects;     ///< TransitionModel::accepted_defects(), which the verdict repeats
+    /// Says whether it is a wheel: its trials end at rest, those of other machines in failure.
+    bool collides() const { return step_name == "collision"; }
   } data;
 };
 

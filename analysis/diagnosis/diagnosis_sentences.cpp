@@ -120,6 +120,13 @@ void say_what_stays(std::vector<std::string>& s, const Diagnosis& d) {
                           d.causes.p_unnamed, where));
 }
 
+double without_effect(const Diagnosis& d) { return d.causes.p_no_gap + d.causes.p_recalibrate; }
+
+std::string without_effect_in_words(const Diagnosis& d) {
+  return fmt::format("With probability {:.2f} no effect acts, and other {} are enough.", without_effect(d),
+                     d.gap.refitted);
+}
+
 void say_explained(std::vector<std::string>& s, const Diagnosis& d) {
   const Cause& likeliest = d.causes.ranked.front();
   if (d.causes.set.size() == 1) {
@@ -136,9 +143,7 @@ void say_explained(std::vector<std::string>& s, const Diagnosis& d) {
     s.push_back(
         fmt::format("The likeliest is {} with probability {:.2f}.", with_parameters(likeliest), likeliest.probability));
   }
-  if (const double no_effect = d.causes.p_no_gap + d.causes.p_recalibrate; no_effect > 1 - d.rules.least_at_work)
-    s.push_back(fmt::format("All the same, no effect acts, and other {} are enough, with probability {:.2f}.",
-                            d.gap.refitted, no_effect));
+  if (without_effect(d) > 1 - d.rules.least_at_work) s.push_back(without_effect_in_words(d));
   if (!d.causes.size.empty()) s.push_back(d.causes.size);
   if (const auto left =
           std::ranges::count_if(d.gap.left.cells, [](const GapCell& cell) { return cell.p_adjusted < shown_level; }))
@@ -158,12 +163,11 @@ void say_unexplained(std::vector<std::string>& s, const Diagnosis& d) {
     return;
   }
   const bool any = !d.causes.ranked.empty();
-  const double no_effect = d.causes.p_no_gap + d.causes.p_recalibrate;
-  if (no_effect > d.causes.p_none && (!any || no_effect > d.causes.ranked.front().probability)) {
-    s.push_back(
-        fmt::format("A gap shows beyond chance (p = {:.2g}), and no effect of the catalogue clearly removes it. With "
-                    "probability {:.2f} no effect acts, and other {} are enough.",
-                    d.gap.p_value, no_effect, d.gap.refitted));
+  if (const double none = without_effect(d);
+      none > d.causes.p_none && (!any || none > d.causes.ranked.front().probability)) {
+    s.push_back(fmt::format(
+        "A gap shows beyond chance (p = {:.2g}), and no effect of the catalogue clearly removes it.", d.gap.p_value));
+    s.push_back(without_effect_in_words(d));
   } else if (any && d.causes.ranked.front().probability > d.causes.p_none) {
     s.push_back(
         fmt::format("There is a gap that recalibration does not remove. The nearest of the catalogue is {}; "

@@ -24,8 +24,8 @@ struct EffectScan {
   std::vector<ScannedEffect> effects;
   Eigen::VectorXd scores;    ///< [columns] sums of the slopes
   Eigen::MatrixXd by_trial;  ///< [trials x columns] efficient scores, summed over a trial's events
-  /// [fitted parameters x columns] by how much the scores scatter with what each one's prior states (sd);
-  /// no rows where nuisances were not refitted
+  /// [fitted parameters x columns] how far each score moves if the stated value of a fitted parameter is off by one sd
+  /// of its prior; it has no rows where nuisances were not refitted.
   Eigen::MatrixXd by_prior;
   Eigen::MatrixXd information;  ///< [columns x columns] efficient
   Eigen::VectorXd whole;        ///< [columns] its diagonal before the projection
@@ -48,8 +48,8 @@ struct ScanBeside {
 EffectScan scan_effects(const TransitionModel& model, const Fit& fit, const std::vector<const Candidate*>& candidates,
                         int threads, const ScanBeside& beside = {});
 
-/// Knows how large the scan's gains get by chance alone, by signs and sizes of whole trials' scores, and of what
-/// priors state, drawn anew (multiplier bootstrap), and what that says of gains found. Few trials, or trials of few
+/// Knows how large the scan's gains get by chance alone, and what that says of gains found. Chance is drawn by
+/// multipliers of whole trials' scores (multiplier bootstrap) and of `by_prior`. Few trials, or trials of few
 /// transitions, have too few scores for that: chance has the covariance of the information then.
 class ChanceGains {
  public:

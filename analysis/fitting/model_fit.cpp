@@ -352,12 +352,13 @@ Fit fit(const TransitionModel& model, const std::vector<double>& nuisance, const
 }
 
 std::vector<double> given_values(const TransitionModel& model) {
-  constexpr int bits = 10, most_passes = 10;  // of the best value; over all that were assumed
+  constexpr int bits = 10;         // A value that was assumed is found to so many.
+  constexpr int most_passes = 10;  // All that were assumed are gone through so often at most.
   int passes = 0;
   std::vector<double> values = nominal_values(model);
   const auto assumed = std::ranges::count_if(model.nuisances(), &Nuisance::assumed);
   double last = std::numeric_limits<double>::infinity(), now = last;
-  do {  // several move one another
+  do {  // The best value of one depends on the others.
     last = now;
     for (std::size_t p = 0; p < values.size(); ++p) {
       const Nuisance& n = model.nuisances()[p];

@@ -64,8 +64,8 @@ struct FitOptions {
 Fit fit(const TransitionModel& model, const std::vector<double>& nuisance, const std::vector<EffectTerm>& terms,
         const FitOptions& options = {});
 
-/// Returns the nuisances of the model as given: nominal values, those that were only assumed at their best
-/// beside them, together.
+/// Returns the nuisances of the model as given: nominal values, and beside them the best values together of those that
+/// were only assumed.
 std::vector<double> given_values(const TransitionModel& model);
 
 /// Returns the better of the fits from the given values and from the model's own starts (TransitionModel::starts).

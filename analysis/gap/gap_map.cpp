@@ -95,8 +95,8 @@ void standardise(std::vector<GapCell>& cells, const std::vector<MapColumn>& colu
   }
 }
 
-// Takes the columns of `rows` around their means, so that a gap does not count as chance, with what the priors let
-// scatter, and of norm 1: sums of rows times normals are statistics by chance.
+// Returns rows whose sums, each row times a standard normal, are statistics by chance: `rows` around their means, so
+// that a gap does not count as chance, and below them `by_prior`. Every column has norm 1.
 Eigen::MatrixXd drawn_anew(const Eigen::MatrixXd& rows, const Eigen::MatrixXd& by_prior) {
   const Eigen::RowVectorXd mean = rows.colwise().mean();
   Eigen::MatrixXd all(rows.rows() + by_prior.rows(), rows.cols());

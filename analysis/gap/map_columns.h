@@ -61,7 +61,7 @@ struct EfficientColumns {
   Eigen::MatrixXd dense;          // [events x columns]
   Eigen::RowVectorXd sums;        // of the columns
   Eigen::RowVectorXd whole_norm;  // squared, before anything was taken off
-  Eigen::MatrixXd by_prior;       // [fitted parameters x columns] by how much each one's prior lets the sums scatter
+  Eigen::MatrixXd by_prior;       // [fitted parameters x columns] as EffectScan::by_prior, of the sums
 };
 
 /// @param fit  that refitted the nuisances, or has no derivatives

@@ -54,15 +54,17 @@ BeliefStep<Most>::BeliefStep(MachineStepper& stepper, const ScorePlan& plan, std
     : stepper_(stepper), lattice_{plan.lattice, {}}, fails_(plan.failing.has_value()), shared_(shared), bent_(bent) {
   std::vector<std::size_t>& scores = lattice_.scores;
   if (!scores.empty()) lattice_.axis = lattice_axis(static_cast<int>(scores.size()), bent);
-  // Where trials may fail every point is asked: between them a band of scores that fail would not be seen.
+  // Where trials may fail, the map is asked at every point of the lattice: a band of scores at which the machine fails
+  // could lie between two of the points that a polynomial needs, and would not be seen.
   if (scores.size() == 1 && !fails_) axis_.emplace(lattice_.axis);
   if (plan.failing && scores.front() != *plan.failing) std::swap(scores.front(), scores.back());
   for (std::size_t m = 0; m < stepper_.scores(); ++m)
     if (std::ranges::find(lattice_.scores, m) == lattice_.scores.end()) straight_.push_back(m);
 }
 
-// The centre, unless the lattice has it, pairs along the root and the straight scores, the lattice, and for each of its
-// scores the same pairs once more, the upper point of each where the score is above zero, the lower one below.
+// Adds the centre, unless the lattice holds it; pairs of points along the columns of the root and along the straight
+// scores; the lattice; and for each of its scores the same pairs once more. Of those pairs the upper point has this
+// score above zero, the lower point has it below.
 template <int Most>
 void BeliefStep<Most>::add_points(const TransitionPlace& place, const Part& belief, const Matrix& root) {
   const Vector mean = belief.mean.head(size());
@@ -84,7 +86,8 @@ void BeliefStep<Most>::add_points(const TransitionPlace& place, const Part& beli
   for (const std::size_t score : lattice_.scores) add_pairs(beside() * unit(score));
 }
 
-// The score at which slopes are taken once more: a point of the lattice near sqrt 3.
+// Returns how many spacings of the lattice lie between zero and the score at which slopes are taken a second time. That
+// score is the point of the lattice next to sqrt 3.
 template <int Most>
 std::size_t BeliefStep<Most>::spacings_beside() const {
   return static_cast<std::size_t>(std::lround(reach / lattice_.axis.spacing));
@@ -94,21 +97,21 @@ double BeliefStep<Most>::beside() const {
   return static_cast<double>(spacings_beside()) * lattice_.axis.spacing;
 }
 
-// The point without a score: the middle one of the lattice, where there is one.
+// Returns the number of the point at which all scores are zero. Where there is a lattice it is its middle point.
 template <int Most>
 std::size_t BeliefStep<Most>::centre_of(std::size_t trial) const {
   return lattice_.scores.empty() ? trial * points_ : lattice_start(trial) + lattice_.points() / 2;
 }
 
-// Says whether a point of a lattice over one score is none of those that tell the others.
+// Says whether the map is not asked at this point at first, because a polynomial may tell it.
 template <int Most>
 bool BeliefStep<Most>::not_asked(std::size_t point) const {
   const std::size_t at = point % points_, first = lattice_start(0);
   return at >= first && at < first + lattice_.points() && !std::ranges::binary_search(axis_->asked(), at - first);
 }
 
-// Tells the points of a trial's lattice from those asked. Returns whether a polynomial holds there: it does not where a
-// point failed.
+// Fills in the points of a trial's lattice at which the map was not asked, by a polynomial through the others. Returns
+// false, and fills in nothing, where one of those failed or the polynomial does not hold.
 template <int Most>
 bool BeliefStep<Most>::told(std::size_t trial) {
   const std::vector<std::size_t>& asked = axis_->asked();
@@ -125,7 +128,8 @@ bool BeliefStep<Most>::told(std::size_t trial) {
   return true;
 }
 
-// Steps all points, of a lattice over one score first some, and the others where these do not tell them.
+// Steps all points. Where a polynomial may tell points of the lattice, the map is asked at the others first, and at
+// these only where the polynomial does not hold.
 template <int Most>
 void BeliefStep<Most>::run_points(std::size_t trials) {
   if (!axis_) return stepper_.run();
@@ -160,8 +164,9 @@ BeliefMatrix<Most> BeliefStep<Most>::first_differences(std::size_t at, const Vec
   return slope;
 }
 
-// How slopes change with a score of the lattice: by the corners of a rectangle of the pair's direction and the score,
-// above and below; by one of the two where the machine fails at a corner of the other.
+// Returns how slopes change with a score of the lattice [states x pairs]. The change is a mixed difference over the
+// corners of a rectangle, whose sides are the pair's direction and the score. It is the mean of one rectangle above
+// zero and one below; where the machine fails at a corner of one of them, the other one stands alone.
 template <int Most>
 BeliefMatrix<Most> BeliefStep<Most>::mixed_differences(std::size_t trial, std::size_t axis) const {
   Matrix change = Matrix::Zero(states(), static_cast<Eigen::Index>(pairs()));

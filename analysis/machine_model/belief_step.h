@@ -73,8 +73,8 @@ class BeliefStep {
                   std::span<const FailureLine<Most>> lines, const FailureEdges<Most>& edges) const;
 
   MachineStepper& stepper_;
-  ScoreLattice lattice_;                // its first score is the failing one
-  std::optional<AxisPolynomial> axis_;  // of a lattice over one score, if no trial may fail
+  ScoreLattice lattice_;                // Its first score is the failing one.
+  std::optional<AxisPolynomial> axis_;  // It is there if the lattice is over one score and no trial may fail.
   bool fails_;
   std::size_t shared_;
   bool bent_;

@@ -18,8 +18,8 @@ std::vector<Event> machine_events(const Machine& machine, const MachineRuns& run
 /// Evaluates them. The state given what was measured is carried as one normal, jointly with what differs between
 /// trials, the scores before and the errors shared by neighbouring rows; its step is exact for linear maps and of
 /// second order in the state for others, and a lattice takes the scores in which a map bends. All trials go together:
-/// the map is called once a step number, once more where some points do not tell a lattice, and a dozen times more
-/// where trials may fail.
+/// the map is called once a step number, once more where a polynomial does not tell a lattice from some of its points,
+/// and a dozen times more where trials may fail.
 /// @param events  machine_events() of the runs
 /// @param chances  where given, filled with the probability of failure in each event's step [events]
 Evaluation follow_machine(const Machine& machine, const MachineRuns& runs, const ScorePlan& plan,

@@ -27,7 +27,6 @@ constexpr UnitFactor unit_factors[]{{180 / std::numbers::pi, "degrees where the 
 constexpr double values_apart = 0.15, scatters_apart = 0.5;  // of logarithms; scatter is known roughly
 constexpr double same_share = 1e-6;                          // of the largest value of a state, asked for twice
 constexpr std::size_t fewest_for_units = 10;                 // rows
-constexpr double median_of_normal = 0.6744897501960817;      // of the size of a standard normal
 
 template <class Known>
 bool every_row(const MachineRuns& runs, Known known) {
@@ -151,7 +150,10 @@ std::vector<double> stepped(const Machine& machine, const NominalSteps& from, st
 }
 
 // Refuses a map that makes something else of the same rows when it is asked again.
-void require_same(const std::vector<double>& once, const std::vector<double>& again, std::size_t states) {
+void require_same_again(const Machine& machine, const NominalSteps& from) {
+  if (from.after.empty()) return;
+  const std::vector<double> once = stepped(machine, from, 0, 0), again = stepped(machine, from, 0, 0);
+  const std::size_t states = machine.states.size();
   std::vector<double> largest(states, 0.0);
   for (std::size_t i = 0; i < once.size(); ++i)
     if (std::isfinite(once[i])) largest[i % states] = std::max(largest[i % states], std::abs(once[i]));
@@ -165,13 +167,10 @@ void require_same(const std::vector<double>& once, const std::vector<double>& ag
 
 // Puts the measured next values beside those of the nominal map, and what lies between beside its noise, and asks
 // whether one is a unit's factor of the other.
-std::vector<std::string> other_units(const Machine& machine, const MachineRuns& runs) {
-  const NominalSteps from = nominal_steps(machine, runs);
+std::vector<std::string> other_units(const Machine& machine, const NominalSteps& from) {
   const std::size_t rows = from.after.size(), d = machine.states.size();
-  if (rows == 0) return {};
-  const std::vector<double> middle = stepped(machine, from, 0, 0);
-  require_same(middle, stepped(machine, from, 0, 0), d);
   if (rows < fewest_for_units) return {};
+  const std::vector<double> middle = stepped(machine, from, 0, 0);
   std::vector<double> variance(middle.size(), 0.0);
   for (std::size_t m = 0; m < static_cast<std::size_t>(machine.scores); ++m) {
     const std::vector<double> up = stepped(machine, from, m, 1), down = stepped(machine, from, m, -1);
@@ -194,12 +193,12 @@ std::vector<std::string> other_units(const Machine& machine, const MachineRuns& 
       if (std::isnan(seen) || std::isnan(foretold)) continue;
       if (foretold != 0) ratios.push_back(seen / foretold);
       if (const double own = variance[i * d + s] + 2 * error * error; own > 0)
-        scatters.push_back((seen - foretold) / std::sqrt(own) / median_of_normal);
+        scatters.push_back(median_deviation_to_sd * (seen - foretold) / std::sqrt(own));
     }
     if (ratios.size() >= fewest_for_units)
       suspect(machine.observe[j].state, "its values are", median(std::move(ratios)), values_apart);
     if (scatters.size() < fewest_for_units) continue;
-    const double centre = median(scatters);  // an effect may move all alike
+    const double centre = median(scatters);  // An effect may have moved all rows alike.
     for (double& one : scatters) one = std::abs(one - centre);
     suspect(machine.observe[j].state, "it scatters", median(std::move(scatters)), scatters_apart);
   }
@@ -272,8 +271,10 @@ std::vector<std::string> look_over(const Machine& machine, const MachineRuns& ru
                                               machine.observe[j].state, least));
   }
   require_launch(machine, runs);
+  const NominalSteps from = nominal_steps(machine, runs);
+  require_same_again(machine, from);
   for (std::string& sentence : doubled_trials(runs)) said.push_back(std::move(sentence));
-  for (std::string& sentence : other_units(machine, runs)) said.push_back(std::move(sentence));
+  for (std::string& sentence : other_units(machine, from)) said.push_back(std::move(sentence));
   return said;
 }
 

@@ -48,8 +48,8 @@ struct MachineRuns {
   std::size_t transitions() const;               ///< from one row to the next, in all trials
   std::size_t longest() const;                   ///< rows of the longest trial
   bool timed() const;                            ///< every row has its time
-  std::string name_of(std::size_t trial) const;  ///< for messages
   bool placed() const;                           ///< every row has its position
+  std::string name_of(std::size_t trial) const;  ///< for messages: MachineTrial::name, or its number
 };
 
 /// The mean and the standard deviation of the values that a sensor has in all rows; mean 0 and sd 1 without a value.

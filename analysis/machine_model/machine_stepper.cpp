@@ -99,7 +99,7 @@ void MachineStepper::add_straight(const TransitionPlace& place, const Eigen::Ref
   for (std::size_t i = 0; i < row.inputs.size(); ++i) values_[lower_.size() + i].push_back(row.inputs[i]);
 }
 
-// Takes what the map returned for a point.
+// Stores what the map returned for a point, with the pushes added.
 void MachineStepper::take(std::size_t point, std::span<const double> next, std::uint8_t failed) {
   std::ranges::copy(next, next_.begin() + static_cast<std::ptrdiff_t>(point * states()));
   failed_[point] = failed;
@@ -110,7 +110,6 @@ void MachineStepper::take(std::size_t point, std::span<const double> next, std::
 }
 
 void MachineStepper::run() {
-  next_.clear();
   std::vector<std::size_t> all(places_.size());
   std::iota(all.begin(), all.end(), std::size_t{0});
   run(all);

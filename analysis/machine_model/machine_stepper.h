@@ -54,10 +54,10 @@ class MachineStepper {
            const Eigen::Ref<const Eigen::VectorXd>& fresh);
   /// Steps all points added. A state that is not finite counts as failed.
   void run();
-  /// Steps some of the points added, by their numbers from 0; what is known of the others stays. What was never stepped
-  /// nor told has no next state.
+  /// Steps some of the points added, given by their numbers from 0. The next states of the others stay as they are; a
+  /// point that was neither stepped nor told has none.
   void run(std::span<const std::size_t> points);
-  /// Takes the next state [states()], pushes and all, of a point that was not stepped and would not fail.
+  /// Stores a next state [states()], which holds the pushes already, for a point that was not stepped and did not fail.
   void tell(std::size_t point, const Eigen::Ref<const Eigen::VectorXd>& next);
   /// Says whether it counts as failed for want of a finite state alone.
   bool lost(std::size_t point) const;

@@ -20,11 +20,11 @@ struct CellSize {
   double spread, reach;
 };
 constexpr CellSize fine{0.4, 5.6}, for_bent{0.5, 4.7}, on_two_axes{0.7, 4.7};
-// Nodes of an axis from which its other points are told, the spacings of a gap between them that is wide, the share of
-// a unit's move by which a polynomial may be off, and the width of the weights exp(-z^2 / width) of the points.
-constexpr int most_nodes = 9;
-constexpr std::size_t wide_gap = 4;
-constexpr double told_share = 1e-4, told_width = 8, told_rounding = 1e-12;
+constexpr int most_nodes = 9;        // A polynomial goes through so many points of an axis.
+constexpr std::size_t wide_gap = 4;  // The map is asked in the middle of gaps of so many spacings between them, too.
+constexpr double told_share = 1e-4;  // A polynomial may be off by this share of the move in a unit of the score,
+constexpr double told_width = 8;     //   weighed by exp(-z^2 / told_width) at the score z,
+constexpr double told_rounding = 1e-12;  //   or by this share of the largest value.
 
 }  // namespace
 

@@ -32,9 +32,10 @@ class AxisPolynomial {
   const std::vector<std::size_t>& asked() const { return asked_; }  ///< indices of points, ascending
   /// Returns [points x functions] what the polynomials say. @param at_asked  [points asked x functions]
   Eigen::MatrixXd told(const Eigen::MatrixXd& at_asked) const { return told_ * at_asked; }
-  /// Says whether polynomials do: neither their two highest powers matter anywhere, nor are they off in a gap, by more
-  /// than a ten-thousandth of how far the function moves in a unit of the score from end to end, weighed by
-  /// exp(-z^2 / 8), or than rounding. A function with the same value at both ends, and another between, has none.
+  /// Says whether the polynomials may stand for the functions. At no point may one of the two highest powers matter,
+  /// and in no wide gap may a polynomial be off, by more than a ten-thousandth of how far its function moves in a unit
+  /// of the score, on average from end to end; what is compared is weighed by exp(-z^2 / 8) at the score z. A
+  /// polynomial does not stand for a function that has the same value at both ends and others between.
   bool holds(const Eigen::MatrixXd& at_asked) const;
 
  private:

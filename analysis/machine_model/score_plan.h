@@ -23,8 +23,7 @@ struct ScorePlan {
 /// it fails within four and a half sds of its scores or did fail.
 /// @param nominal  without spreads and memory: a measured row is all of a point
 /// @throws std::invalid_argument for a hypothesis with these, where the map returns no finite state from a measured
-/// row, and where it fails at zero
-///   scores from most rows that went on
+///   row, and where it fails at zero scores from most rows that went on
 ScorePlan score_plan(const Machine& machine, const MachineRuns& runs, const MachineHypothesis& nominal);
 
 }  // namespace metastable::analysis

@@ -220,7 +220,8 @@ std::vector<double> bounded_survival_after(const Chain& chain, std::span<const d
   followed.follow(std::min(last, anyhow));
   std::vector<double> told;
   if (followed.now() < last && !followed.ended()) {
-    // Where every share has to settle by itself, nothing foretells when: slow modes are tried, then products.
+    // Without a harmless share, survivors count as settled only when the share of every state has settled, and no
+    // estimate says after how many steps that is. The slow modes are then tried first, and more products after them.
     const double harmless = settled->harmless();
     const double needed =
         harmless > 0 ? std::min(last, steps_foreseen(followed.now(), half_way, followed.unsettled(), harmless)) : last;

@@ -224,9 +224,9 @@ class Study {
     return {value, value * std::exp(-half), value * std::exp(half)};
   }
 
-  /// Returns an interval that is no narrower than its earlier ones were, at the number of steps taken since. Rounds end
-  /// where the interval is as narrow as asked, and so at estimates of the scatter that happen to be small; the first
-  /// that 30 lines vouch for is not chosen so (C. Stein, Ann. Math. Stat. 16, 243, 1945).
+  /// Returns an interval that is no narrower than each earlier one would be at the steps taken by now. The rounds end
+  /// where the interval is as narrow as asked, and so at estimates of the scatter that happen to be small. The first
+  /// estimate for which 30 lines vouch is not chosen in this way (C. Stein, Ann. Math. Stat. 16, 243, 1945).
   /// @param scatter  the largest half-width of the logarithm so far, times the root of the steps
   MeshEstimate unchosen(const MeshEstimate& found, double& scatter) const {
     const double root = std::sqrt(static_cast<double>(rounds_.front().shares.size()));
