@@ -51,7 +51,7 @@ std::map<std::string, double> probabilities_beside_unnamed(const TransitionModel
   std::vector<Fit> with(leading.size());
   markov::parallel_for(with.size(), options.threads, [&](std::size_t k) {
     beat();
-    with[k] = fit_one_more(model, effort, best.fit, scan.effects[leading[k]]);
+    with[k] = fit_one_more(model, effort, best.fit, scan.effects[leading[k]], true);
   });
   const Fit& joined = *std::ranges::max_element(with, {}, &Fit::penalised);
   if (!(joined.penalised >= best.fit.penalised)) return {};

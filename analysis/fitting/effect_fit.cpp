@@ -62,8 +62,8 @@ Effort effort_for(const TransitionModel& model, const Fit& recalibrated) {
   constexpr double far_off = 50;  // rise of the log likelihood that a recalibration has left
   if ((!recalibrated.converged && recalibrated.promised > far_off) ||
       (model.events().size() > few_events && is_far_off(recalibrated.evaluation.score)))
-    return {20, 1, 1, 1, 1, 2, 6, 2};
-  if (model.events().size() > many_events) return {6, 1, 1, 2, 2, 2, 12, 3};
+    return {20, 1, 1, 1, 1, 6, 2};
+  if (model.events().size() > many_events) return {6, 1, 1, 2, 2, 12, 3};
   return {};
 }
 
@@ -79,14 +79,40 @@ EffectTerm term_at(const ScannedEffect& scanned, std::size_t variant) {
   return term;
 }
 
-Fit fit_one_more(const TransitionModel& model, const Effort& effort, const Fit& base, const ScannedEffect& scanned) {
-  const FitOptions options{.count = {}, .refit_nuisances = true, .most_iterations = effort.most_iterations};
+namespace {
+
+// Fits from the neutral values, where the scan has the slopes of the best variant.
+Fit fit_from_neutral(const TransitionModel& model, const Fit& base, const ScannedEffect& scanned, FitOptions options) {
+  std::vector<EffectTerm> terms = base.terms;
+  terms.push_back({scanned.candidate, scanned.candidate->variants[scanned.best], {}});
+  for (const FreeParameter& p : scanned.candidate->parameters) terms.back().values.push_back(p.neutral);
+  Derivatives joined = base.derivatives;
+  const Eigen::Index held = joined.slope.cols(), more = scanned.columns.slope.cols();
+  joined.slope.conservativeResize(Eigen::NoChange, held + more);
+  joined.change.conservativeResize(Eigen::NoChange, held + more);
+  joined.slope.rightCols(more) = scanned.columns.slope;
+  joined.change.rightCols(more) = scanned.columns.change;
+  joined.steps.insert(joined.steps.end(), scanned.columns.steps.begin(), scanned.columns.steps.end());
+  options.evaluation = &base.evaluation;
+  options.derivatives = &joined;
+  return fit(model, base.nuisance, terms, options);
+}
+
+}  // namespace
+
+Fit fit_one_more(const TransitionModel& model, const Effort& effort, const Fit& base, const ScannedEffect& scanned,
+                 bool gain_alone) {
+  FitOptions options{.count = {}, .refit_nuisances = true, .most_iterations = effort.most_iterations};
+  options.ends_as_foretold = gain_alone;
+  const bool moderate = base.converged && scanned.gain[scanned.best] < far_gain;
   Fit best;
   bool first = true;
   for (const std::size_t variant : leading_variants(scanned, effort.most_variants)) {
     std::vector<EffectTerm> terms = base.terms;
     terms.push_back(term_at(scanned, variant));
-    Fit tried = best_fit(model, base.nuisance, terms, options);
+    Fit tried = moderate && variant == scanned.best && model.starts(terms).empty()
+                    ? fit_from_neutral(model, base, scanned, options)
+                    : best_fit(model, base.nuisance, terms, options);
     const auto try_from = [&](auto value_of) {
       for (std::size_t p = 0; p < terms.back().values.size(); ++p)
         terms.back().values[p] = value_of(scanned.candidate->parameters[p]);
@@ -105,7 +131,7 @@ Fit fit_one_more(const TransitionModel& model, const Effort& effort, const Fit& 
 
 void refine_variant(const TransitionModel& model, const Effort& effort, Fit& best) {
   const std::vector<double> spacing = best.terms.back().candidate->refine;
-  const bool was_converged = best.converged;
+  bool moved = false;
   double share = 0.5;
   for (int round = 0; round < effort.refinements; ++round, share /= 2)
     for (std::size_t entry = 0; entry < spacing.size(); ++entry) {
@@ -113,17 +139,16 @@ void refine_variant(const TransitionModel& model, const Effort& effort, Fit& bes
       for (const double sign : {1.0, -1.0}) {
         std::vector<EffectTerm> terms = best.terms;
         terms.back().variant[entry] += sign * share * spacing[entry];
-        Fit tried = fit(model, best.nuisance, terms,
-                        {.count = {}, .refit_nuisances = true, .most_iterations = effort.refining_steps});
+        Fit tried = stepped(model, best, terms);
         if (!(tried.penalised > best.penalised + worth_moving)) continue;
         best = std::move(tried);
+        moved = true;
         break;
       }
     }
-  if (best.converged || !was_converged) return;
-  // Its last step was cut short, and its slopes are those before it.
-  best = fit(model, best.nuisance, best.terms,
-             {.count = {}, .refit_nuisances = true, .most_iterations = effort.most_iterations});
+  if (moved)
+    best = fit(model, best.nuisance, best.terms,
+               {.count = {}, .refit_nuisances = true, .most_iterations = effort.most_iterations});
 }
 
 }  // namespace metastable::analysis

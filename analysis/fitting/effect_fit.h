@@ -15,7 +15,6 @@ struct Effort {
   std::size_t most_leaders = 3;   ///< single effects that are refined, and that pairs are built on if not far behind
   std::size_t most_partners = 3;  ///< of one leader that are fitted
   int refinements = 3;            ///< of a variant, each with half the moves
-  int refining_steps = 4;         ///< of the fit at each move
   int most_iterations = FitOptions{}.most_iterations;
   std::size_t most_effects = 4;  ///< of one hypothesis
 };
@@ -26,7 +25,9 @@ EffectTerm term_at(const ScannedEffect& scanned, std::size_t variant);
 
 /// Finds the best fit of `base` with one more effect, as its last term.
 /// @param scanned  beside `base`
-Fit fit_one_more(const TransitionModel& model, const Effort& effort, const Fit& base, const ScannedEffect& scanned);
+/// @param gain_alone  its likelihood is all that is asked for: a step that rises about as it foretold is the last
+Fit fit_one_more(const TransitionModel& model, const Effort& effort, const Fit& base, const ScannedEffect& scanned,
+                 bool gain_alone = false);
 
 /// Moves the last term's variant between the list's values as long as the likelihood rises, halving the moves.
 void refine_variant(const TransitionModel& model, const Effort& effort, Fit& best);

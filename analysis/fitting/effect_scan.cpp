@@ -5,9 +5,13 @@
 #include <algorithm>
 #include <cmath>
 #include <functional>
+#include <map>
+#include <memory>
+#include <optional>
 #include <stdexcept>
 #include <utility>
 
+#include "analysis/fitting/transition_responses.h"
 #include "analysis/statistics/falling_order.h"
 #include "analysis/statistics/random.h"
 #include "markov/dense_matrix.h"
@@ -18,6 +22,7 @@ namespace {
 
 constexpr double largest_step = 0.1, small_step = 0.05;  // of a difference, in standard errors
 constexpr std::size_t most_scanned = 24;                 // variants of an effect that are scanned beside another one
+constexpr std::size_t fewest_columns = 4;                // that add to one number, for its responses
 constexpr double far_out = 0.03;  // share of the draws beyond which a tail follows its law instead of their count
 
 // Returns the root of the inverse of an effect's information, that of its priors included, in the directions that the
@@ -117,27 +122,97 @@ ScannedEffect list_terms(const Candidate& candidate, const ScanBeside& beside, E
   return effect;
 }
 
-// Fills a term's columns. Only its parameters are moved, by a small share of what the data resolve.
-void differentiate(const TransitionModel& model, const Fit& fit, const ScannedTerm& scanned, const ScanBeside& beside,
+// One column of a scan: a parameter of a term.
+struct ScannedColumn {
+  Eigen::Index column;
+  const EffectTerm* term;
+  std::size_t parameter;
+};
+
+std::vector<ScannedColumn> list_columns(const std::vector<ScannedTerm>& terms) {
+  std::vector<ScannedColumn> all;
+  for (const ScannedTerm& one : terms)
+    for (std::size_t p = 0; p < one.term.values.size(); ++p)
+      all.push_back({one.first + static_cast<Eigen::Index>(p), &one.term, p});
+  return all;
+}
+
+// Fills a column. Only its parameter is moved, by a small share of what the data resolve.
+void differentiate(const TransitionModel& model, const Fit& fit, const ScannedColumn& scanned, const ScanBeside& beside,
                    Derivatives& all) {
-  for (std::size_t p = 0; p < scanned.term.values.size(); ++p) {
-    const auto column = scanned.first + static_cast<Eigen::Index>(p);
-    double step = first_step(beside, scanned.term, p);
-    for (int attempt = 0; attempt < 2; ++attempt) {
-      std::vector<EffectTerm> moved = fit.terms;
-      moved.push_back(scanned.term);
-      moved.back().values[p] += step;
-      const Evaluation there = model.evaluate(fit.nuisance, moved);
-      for (Eigen::Index k = 0; k < all.slope.rows(); ++k) {
-        const auto event = static_cast<std::size_t>(k);
-        all.slope(k, column) = (there.log_density[event] - fit.evaluation.log_density[event]) / step;
-        all.change(k, column) = (there.score[event] - fit.evaluation.score[event]) / step;
-      }
-      const double resolved = 1 / std::sqrt(std::max(1e-300, all.change.col(column).squaredNorm()));
-      if (step < largest_step * resolved) break;
-      step = small_step * resolved;
+  double step = first_step(beside, *scanned.term, scanned.parameter);
+  for (int attempt = 0; attempt < 2; ++attempt) {
+    std::vector<EffectTerm> moved = fit.terms;
+    moved.push_back(*scanned.term);
+    moved.back().values[scanned.parameter] += step;
+    const Evaluation there = model.evaluate(fit.nuisance, moved);
+    for (Eigen::Index k = 0; k < all.slope.rows(); ++k) {
+      const auto event = static_cast<std::size_t>(k);
+      all.slope(k, scanned.column) = (there.log_density[event] - fit.evaluation.log_density[event]) / step;
+      all.change(k, scanned.column) = (there.score[event] - fit.evaluation.score[event]) / step;
+    }
+    const double resolved = 1 / std::sqrt(std::max(1e-300, all.change.col(scanned.column).squaredNorm()));
+    if (step < largest_step * resolved) break;
+    step = small_step * resolved;
+  }
+}
+
+// A number of the model, the columns that add to it, and the largest of their steps.
+struct AddedTo {
+  std::vector<ScannedColumn> columns;
+  double step = 0;
+  std::unique_ptr<TransitionResponses> responses = {};
+};
+
+// Sorts columns by the number that they add to. Those that do more than add come back.
+std::vector<ScannedColumn> sort_out(const TransitionModel& model, const std::vector<ScannedColumn>& columns,
+                                    const ScanBeside& beside, std::map<std::size_t, AddedTo>& numbers) {
+  std::vector<ScannedColumn> others;
+  for (const ScannedColumn& one : columns) {
+    const std::optional<Addition> addition = model.addition(*one.term, one.parameter);
+    if (!addition) {
+      others.push_back(one);
+      continue;
+    }
+    double largest = 0;
+    for (const double weight : addition->weights) largest = std::max(largest, std::abs(weight));
+    if (largest == 0) continue;  // it adds nothing, and its column is zero
+    AddedTo& number = numbers[addition->number];
+    number.columns.push_back(one);
+    number.step = std::max(number.step, first_step(beside, *one.term, one.parameter) * largest);
+  }
+  return others;
+}
+
+// Fills the columns that are sums of what events answer to single transitions. Returns the others.
+std::vector<ScannedColumn> fill_by_responses(const TransitionModel& model, const Fit& fit,
+                                             const std::vector<ScannedColumn>& columns, const ScanBeside& beside,
+                                             int threads, Derivatives& all) {
+  std::map<std::size_t, AddedTo> numbers;
+  std::vector<ScannedColumn> others = sort_out(model, columns, beside, numbers);
+  std::vector<std::pair<std::size_t, AddedTo*>> worth;
+  for (auto& [number, added] : numbers)
+    if (added.columns.size() >= fewest_columns) worth.emplace_back(number, &added);
+  markov::parallel_for(worth.size(), threads, [&](std::size_t i) {
+    const auto& [number, added] = worth[i];
+    added->responses = std::make_unique<TransitionResponses>(model, fit, number, added->step);
+  });
+  std::vector<std::pair<TransitionResponses*, std::size_t>> evaluations;
+  for (auto& [number, added] : worth) {
+    const std::size_t count = added->responses->evaluations();
+    if (count == 0 || count >= added->columns.size()) added->responses.reset();
+    for (std::size_t k = 0; added->responses && k < count; ++k) evaluations.emplace_back(added->responses.get(), k);
+  }
+  markov::parallel_for(evaluations.size(), threads,
+                       [&](std::size_t i) { evaluations[i].first->evaluate(evaluations[i].second); });
+  for (const auto& [number, added] : numbers) {
+    if (!added.responses) others.insert(others.end(), added.columns.begin(), added.columns.end());
+    for (std::size_t i = 0; added.responses && i < added.columns.size(); ++i) {
+      const ScannedColumn& one = added.columns[i];
+      added.responses->fill(*model.addition(*one.term, one.parameter), one.column, all);
     }
   }
+  return others;
 }
 
 // Projects what the fitted parameters could take up out of scores and information, which makes them efficient.
@@ -187,8 +262,8 @@ EffectScan scan_effects(const TransitionModel& model, const Fit& fit, const std:
       scan.effects.push_back(list_terms(*candidate, beside, columns, scanned));
   const auto events = static_cast<Eigen::Index>(model.events().size());
   Derivatives all{Eigen::MatrixXd::Zero(events, columns), Eigen::MatrixXd::Zero(events, columns)};
-  markov::parallel_for(scanned.size(), threads,
-                       [&](std::size_t i) { differentiate(model, fit, scanned[i], beside, all); });
+  const std::vector<ScannedColumn> alone = fill_by_responses(model, fit, list_columns(scanned), beside, threads, all);
+  markov::parallel_for(alone.size(), threads, [&](std::size_t i) { differentiate(model, fit, alone[i], beside, all); });
   project(model, fit, all, scan);
   for (ScannedEffect& effect : scan.effects) {
     const auto count = static_cast<Eigen::Index>(effect.candidate->parameters.size());
@@ -199,6 +274,9 @@ EffectScan scan_effects(const TransitionModel& model, const Fit& fit, const std:
       effect.start.push_back(start);
     }
     effect.best = falling_order(effect.gain).front();
+    effect.columns = {all.slope.middleCols(effect.first[effect.best], count),
+                      all.change.middleCols(effect.first[effect.best], count),
+                      std::vector<double>(effect.candidate->parameters.size())};
   }
   return scan;
 }

@@ -19,10 +19,12 @@ constexpr double unresolved = 0.5, unresolved_share = 1e-4;
 // Shares of the information's diagonal that are added to it. Where a step rises by less than this share of what it
 // promised, the next one is damped more.
 constexpr double dampings[] = {0, 1e-4, 1e-3, 1e-2, 0.1, 1}, least_kept = 0.25;
-// Share of what a step foretold by which its rise may differ, for what it leaves to be next to nothing: of the order of
-// that share squared.
-constexpr double as_foretold = 0.1;
+// A step that foretold no more than this rise of the log likelihood, and rose by that up to this share, leaves next to
+// nothing: of the order of that share squared.
+constexpr double small_rise = 3, as_foretold = 0.1;
 constexpr int most_halvings = 7, few_halvings = 3;  // of a step; of one that is damped more where another failed
+constexpr double much_more = 1.25, longest = 8;     // than a step foretold; times a step
+constexpr int rough_steps = 2;                      // by slopes of another place
 constexpr double difference_share = 0.05;           // step of a difference, of what the data resolve
 
 // Holds all parameters of a hypothesis in one vector.
@@ -130,27 +132,35 @@ Eigen::VectorXd gauss_newton(const Eigen::MatrixXd& information, const Eigen::Ve
   return root * (root.transpose() * picked(gradient, part));
 }
 
-// Halves the step until the penalised likelihood rises above `best`; the point stays where it was if it never does.
-void search(Point& point, const std::vector<Eigen::Index>& part, const Eigen::VectorXd& step,
+// Halves the step until the penalised likelihood rises above `best`; the point stays where it was if it never does. A
+// step that rises much more than it foretold is too short, because the information is less than it seems: it is made as
+// long as a parabola through that rise says.
+void search(Point& point, const std::vector<Eigen::Index>& part, const Eigen::VectorXd& step, double foretold,
             const Eigen::VectorXd& weights, int halvings, double& best, Evaluation& evaluation) {
   auto& slots = point.slots();
   std::vector<double> before;
   for (const Eigen::Index p : part) before.push_back(*slots[static_cast<std::size_t>(p)].value);
-  double share = 1;
-  for (int halving = 0; halving < halvings; ++halving, share /= 2) {
+  const double start = best;
+  const auto go = [&](double share) {
     for (std::size_t a = 0; a < part.size(); ++a) {
       const Point::Slot& s = slots[static_cast<std::size_t>(part[a])];
       *s.value = std::clamp(before[a] + share * step[static_cast<Eigen::Index>(a)], s.lower, s.upper);
     }
+  };
+  const auto better = [&](double share) {
+    go(share);
     Evaluation tried = point.evaluate();
     const double value = counted(tried, weights) + point.log_prior();
-    if (value > best) {
-      best = value;
-      evaluation = std::move(tried);
-      return;
-    }
-  }
-  for (std::size_t a = 0; a < part.size(); ++a) *slots[static_cast<std::size_t>(part[a])].value = before[a];
+    if (!(value > best)) return false;
+    best = value;
+    evaluation = std::move(tried);
+    return true;
+  };
+  double share = 1;
+  for (int halving = 0; !better(share); ++halving, share /= 2)
+    if (halving + 1 == halvings) return go(0);
+  const double ratio = (best - start) / foretold;
+  if (share == 1 && ratio > much_more && !better(std::min(longest, 1 / std::max(1e-9, 2 - ratio)))) go(1);
 }
 
 // Returns the gradient of the penalised likelihood at the point where result.derivatives were taken. The prior goes
@@ -230,6 +240,12 @@ class Climb {
     return stride;
   }
 
+  // Moves all parameters together and says whether that was better.
+  bool step(const FreeParts& parts) {
+    Stride stride;
+    return rises(parts.all, 0, few_halvings, best_, stride);
+  }
+
   void damp_next(const Stride& stride) {
     if (stride.risen < least_kept * stride.foretold)
       level_ = std::min(level_ + 1, std::size(dampings) - 1);
@@ -246,7 +262,8 @@ class Climb {
   bool rises(const std::vector<Eigen::Index>& part, std::size_t damped, int halvings, double before, Stride& stride) {
     if (part.empty()) return false;
     const Eigen::VectorXd step = step_of(part, damped, stride);
-    if (stride.foretold > worth_a_step) search(point_, part, step, weights_, halvings, best_, fit_.evaluation);
+    if (stride.foretold > worth_a_step)
+      search(point_, part, step, stride.foretold, weights_, halvings, best_, fit_.evaluation);
     return best_ - before >= worth_a_step;
   }
 
@@ -294,12 +311,43 @@ Derivatives derivatives(const TransitionModel& model, const std::vector<double>&
   return differences(point, here);
 }
 
+Fit stepped(const TransitionModel& model, const Fit& near, const std::vector<EffectTerm>& terms) {
+  Point point(model, near.nuisance, terms, true);
+  const Eigen::VectorXd weights = event_weights(model, {});
+  Fit result;
+  result.evaluation = point.evaluate();
+  result.derivatives = near.derivatives;
+  Climb climb(point, weights, result);
+  const auto scores = [&](const Evaluation& of) {
+    return Eigen::VectorXd(Eigen::VectorXd::Map(of.score.data(), weights.size()));
+  };
+  Eigen::VectorXd z = scores(near.evaluation);
+  const auto carry = [&] {
+    const Eigen::VectorXd now = scores(result.evaluation);
+    result.derivatives.slope += (z - now).asDiagonal() * result.derivatives.change;
+    z = now;
+  };
+  carry();
+  for (int step = 0; step < rough_steps; ++step) {
+    result.information = information(result.derivatives, result.evaluation, weights);
+    result.gradient = penalised_gradient(point.slots(), weights, result);
+    if (!climb.step(free_parts(point.slots(), result.gradient, result.information))) break;
+    carry();
+  }
+  result.nuisance = point.nuisance();
+  result.terms = point.terms();
+  result.log_likelihood = counted(result.evaluation, weights);
+  result.penalised = climb.best();
+  result.converged = false;
+  return result;
+}
+
 Fit fit(const TransitionModel& model, const std::vector<double>& nuisance, const std::vector<EffectTerm>& terms,
         const FitOptions& options) {
   Point point(model, nuisance, terms, options.refit_nuisances);
   const Eigen::VectorXd weights = event_weights(model, options.count);
   Fit result;
-  result.evaluation = options.from ? options.from->evaluation : point.evaluate();
+  result.evaluation = options.evaluation ? *options.evaluation : point.evaluate();
   Climb climb(point, weights, result);
   const double start = climb.best();
   const bool finite = std::isfinite(start);
@@ -308,8 +356,8 @@ Fit fit(const TransitionModel& model, const std::vector<double>& nuisance, const
   if (!finite) result.reason = "its likelihood is not finite";
   for (int iteration = 0; finite && iteration < options.most_iterations + both_sides && !point.slots().empty();
        ++iteration) {
-    result.derivatives =
-        options.from && iteration == 0 ? options.from->derivatives : differences(point, result.evaluation, both_sides);
+    result.derivatives = iteration == 0 && options.derivatives ? *options.derivatives
+                                                               : differences(point, result.evaluation, both_sides);
     result.information = information(result.derivatives, result.evaluation, weights);
     result.gradient = penalised_gradient(point.slots(), weights, result);
     const FreeParts parts = free_parts(point.slots(), result.gradient, result.information);
@@ -321,7 +369,8 @@ Fit fit(const TransitionModel& model, const std::vector<double>& nuisance, const
     const double resolved = unresolved + unresolved_share * (climb.best() - start);
     const Stride stride = climb.stride(parts, resolved, both_sides);
     result.promised = stride.promised;
-    if (options.from && stride.better && std::abs(stride.risen - stride.foretold) < as_foretold * stride.foretold) {
+    if (options.ends_as_foretold && stride.better && stride.foretold < small_rise &&
+        std::abs(stride.risen - stride.foretold) < as_foretold * stride.foretold) {
       result.converged = true;
       break;
     }

@@ -51,9 +51,11 @@ struct FitOptions {
   std::vector<char> count;  ///< by trial: 0 leaves its events out; empty: all
   bool refit_nuisances = true;
   int most_iterations = 25;
-  /// A converged fit of all trials, from which this one of most of them starts: its derivatives serve for the first
-  /// step, and a step that rises about as it foretold is the last.
-  const Fit* from = nullptr;
+  /// What is known where it starts: the evaluation, and derivatives for the first step.
+  const Evaluation* evaluation = nullptr;
+  const Derivatives* derivatives = nullptr;
+  /// If true, a step that rises about as it foretold is the last. The fit's derivatives are those before it, then.
+  bool ends_as_foretold = false;
 };
 
 /// Finds the maximum of the penalised likelihood by Gauss-Newton steps on the scores: with z the normal score and J =
@@ -75,6 +77,11 @@ Fit best_fit(const TransitionModel& model, const std::vector<double>& nuisance, 
 /// Takes the derivatives at a point with respect to the free parameters of `terms` only.
 Derivatives derivatives(const TransitionModel& model, const std::vector<double>& nuisance,
                         const std::vector<EffectTerm>& terms, const Evaluation& here, bool with_nuisances);
+
+/// Takes the first steps of a fit of terms that differ little from those of another fit, by that one's derivatives:
+/// those of the scores, and those of what log densities are more than the scores'. It has not converged, but its
+/// likelihood says what a fit would come to.
+Fit stepped(const TransitionModel& model, const Fit& near, const std::vector<EffectTerm>& terms);
 
 /// Returns the information of columns: sum over counted events of change change^T + (slope + z change)(...)^T.
 /// @param weights  by event, 1 or 0

@@ -39,6 +39,12 @@ EffectTerm term_of(const Candidate& candidate, const std::vector<double>& catalo
   return {&candidate, std::move(form.variant), std::move(form.values)};
 }
 
+std::optional<Addition> TransitionModel::addition(const EffectTerm&, std::size_t) const { return std::nullopt; }
+
+Evaluation TransitionModel::evaluate_with(std::span<const double>, std::span<const EffectTerm>, const Addition&) const {
+  throw std::logic_error("TransitionModel::evaluate_with: this model has no additions");
+}
+
 std::vector<FitStart> TransitionModel::starts(std::span<const EffectTerm>) const { return {}; }
 
 std::vector<std::string> TransitionModel::effect_ids() const {

@@ -129,6 +129,12 @@ struct EffectTerm {
   std::vector<double> values;
 };
 
+/// What a unit of an effect's parameter adds to one number of the model, transition by transition.
+struct Addition {
+  std::size_t number = 0;       ///< which of the numbers that the model lets differ between transitions
+  std::vector<double> weights;  ///< [transitions], of all trials in their order
+};
+
 /// Makes the candidate the effect with these values of the catalogue.
 EffectTerm term_of(const Candidate& candidate, const std::vector<double>& catalogue_values);
 
@@ -197,6 +203,15 @@ class TransitionModel {
   /// Gives the densities with these nuisances and effects. Values outside a model's reach give a very small density,
   /// never a NaN.
   virtual Evaluation evaluate(std::span<const double> nuisance, std::span<const EffectTerm> terms) const = 0;
+  /// Counts the transitions of each trial. Event::number is that of its transition in the trial, from 1. The default is
+  /// none: the model has no additions.
+  virtual std::vector<std::size_t> transitions() const { return {}; }
+  /// Returns what a term at its neutral values adds, a unit of one of its parameters, if an addition is all that it
+  /// does. The default says that it is not.
+  virtual std::optional<Addition> addition(const EffectTerm& term, std::size_t parameter) const;
+  /// Gives the densities with an addition beside the terms. The default throws std::logic_error.
+  virtual Evaluation evaluate_with(std::span<const double> nuisance, std::span<const EffectTerm> terms,
+                                   const Addition& added) const;
   /// Says whether a recalibration refits the noise of every step, so that it takes up part of a large gap.
   virtual bool refits_noise() const { return false; }
   /// Offers starts that the data themselves suggest for a fit of these terms, tried beside the usual one. The default

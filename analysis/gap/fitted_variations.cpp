@@ -69,7 +69,7 @@ std::vector<LeftInFacet> fitted_variations(const TransitionModel& model, const F
   markov::parallel_for(fitted, threads, [&](std::size_t k) {
     beat();
     const ScannedEffect& scanned = scan.effects[order[k]];
-    const Fit best = fit_one_more(model, effort, recalibrated, scanned);
+    const Fit best = fit_one_more(model, effort, recalibrated, scanned, true);
     all[order[k]] = as_left(model.variations()[order[k]], scanned,
                             std::max(0.0, 2 * (best.penalised - recalibrated.penalised)), rules);
   });

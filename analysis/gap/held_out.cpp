@@ -29,7 +29,11 @@ std::vector<int> folds_of_trials(std::size_t trials, int folds, std::uint64_t se
 
 Fit fit_from(const Fit& start, const TransitionModel& model, const Fit& recalibrated, FitOptions options) {
   options.most_iterations = start.converged ? fold_steps : effort_for(model, recalibrated).most_iterations;
-  if (start.converged) options.from = &start;
+  if (start.converged) {
+    options.evaluation = &start.evaluation;
+    options.derivatives = &start.derivatives;
+    options.ends_as_foretold = true;
+  }
   return fit(model, start.nuisance, start.terms, options);
 }
 

@@ -3,7 +3,10 @@
 
 #include <cstddef>
 #include <functional>
+#include <optional>
 #include <vector>
+
+#include "analysis/fitting/transition_model.h"
 
 namespace metastable::analysis {
 
@@ -44,6 +47,16 @@ struct MachineHypothesis {
   double outliers = 0;                   ///< share of steps whose scores are drawn wide
   double wild = 0;                       ///< share of rows that say nothing of the state
 };
+
+/// A number of a hypothesis that may be more by so much in each transition: one of the map's values, then what a state
+/// is pushed by, then the logarithm of the scores' scatter.
+/// @param states  how many the machine has
+void add(MachineHypothesis& hypothesis, std::size_t states, const Addition& added);
+
+/// Returns what a change adds to one such number, in units of `step`; none if that is not all it does.
+/// @param plain  the hypothesis that it changed, without additions
+std::optional<Addition> addition_of(const MachineHypothesis& plain, const MachineHypothesis& changed,
+                                    std::size_t states, double step);
 
 /// Changes a hypothesis as an effect or a variation does, with these values of its variant and its parameters.
 using MachineChange =

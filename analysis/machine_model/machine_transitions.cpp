@@ -73,6 +73,18 @@ class MachineTransitions : public TransitionModel {
   Evaluation evaluate(std::span<const double> nuisance, std::span<const EffectTerm> terms) const override {
     return follow_machine(*machine_, runs_, plan_, events_, hypothesis(nuisance, terms));
   }
+  std::vector<std::size_t> transitions() const override {
+    std::vector<std::size_t> all;
+    for (const MachineTrial& trial : runs_.trials) all.push_back(steps_of(trial));
+    return all;
+  }
+  std::optional<Addition> addition(const EffectTerm& term, std::size_t parameter) const override;
+  Evaluation evaluate_with(std::span<const double> nuisance, std::span<const EffectTerm> terms,
+                           const Addition& added) const override {
+    MachineHypothesis supposed = hypothesis(nuisance, terms);
+    add(supposed, machine_->states.size(), added);
+    return follow_machine(*machine_, runs_, plan_, events_, supposed);
+  }
   std::vector<FitStart> starts(std::span<const EffectTerm> terms) const override {
     std::vector<FitStart> all = starts_->starts(terms);
     for (FitStart& start : all)  // the share of wild rows is the last nuisance
@@ -191,6 +203,14 @@ MachineHypothesis MachineTransitions::hypothesis(std::span<const double> nuisanc
     if (named(push_.variation.candidate)) push_.apply(h, term.variant, term.values);
   }
   return h;
+}
+
+std::optional<Addition> MachineTransitions::addition(const EffectTerm& term, std::size_t parameter) const {
+  EffectTerm moved = term;
+  const double step = term.candidate->parameters[parameter].step;
+  moved.values[parameter] += step;
+  const std::vector<double> nominal = nominal_values(*this);
+  return addition_of(hypothesis(nominal, {}), hypothesis(nominal, std::vector{moved}), machine_->states.size(), step);
 }
 
 // A state that the map foretells exactly and that is measured exactly has no density.

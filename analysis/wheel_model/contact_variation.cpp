@@ -99,13 +99,16 @@ CollisionPlace collision_place(const WheelRun& run, std::size_t trial, std::size
   return place;
 }
 
-void ContactVariation::apply(const CollisionPlace& place, const EffectTerm& term, dynamics::StepContext& step) const {
-  constexpr double furthest = 3;  // where far covariates meet large values
-  const double ratio = std::exp(std::clamp(log_ratio(place, term.variant, term.values), -furthest, furthest));
+void vary(dynamics::StepContext& step, ContactAspect aspect, double amount) {
+  constexpr double furthest = 3;
+  if (aspect == ContactAspect::loss) {
+    step.loss_added += amount;
+    return;
+  }
   double& changed = aspect == ContactAspect::mean_friction      ? step.friction_ratio
                     : aspect == ContactAspect::mean_restitution ? step.restitution_ratio
                                                                 : step.friction_scatter;
-  changed *= ratio;
+  changed *= std::exp(std::clamp(amount, -furthest, furthest));
 }
 
 namespace {

@@ -26,7 +26,17 @@ struct CollisionPlace {
 CollisionPlace collision_place(const WheelRun& run, std::size_t trial, std::size_t before, const RunCollision& here,
                                double omega);
 
-enum class ContactAspect { mean_friction, mean_restitution, scatter_of_friction };
+enum class ContactAspect { mean_friction, mean_restitution, scatter_of_friction, loss };
+
+/// Changes an aspect of a step's contact by an amount: that of the logarithm, of which far covariates may not make more
+/// than 3, and of a loss itself.
+void vary(dynamics::StepContext& step, ContactAspect aspect, double amount);
+
+/// The amount by which an effect changes an aspect of one collision's contact, a unit of one of its parameters.
+struct AspectChange {
+  ContactAspect aspect = ContactAspect::mean_friction;
+  double amount = 0;
+};
 
 /// Holds a variation, and the change of its logarithm at a collision: of the mean of mu or of eta, or of the scatter of
 /// mu about its mean.
@@ -35,9 +45,6 @@ struct ContactVariation {
   ContactAspect aspect = ContactAspect::mean_friction;
   std::function<double(const CollisionPlace&, const std::vector<double>& variant, const std::vector<double>& values)>
       log_ratio;
-
-  /// Puts it into a step that happens at that place.
-  void apply(const CollisionPlace& place, const EffectTerm& term, dynamics::StepContext& step) const;
 };
 
 /// Lists them for these runs. Of the means: smooth changes along a trial by the clock, swings over the trials, every

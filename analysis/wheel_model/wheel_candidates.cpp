@@ -126,6 +126,11 @@ WheelCandidate leg_contact(const WheelDesign& design) {
     e.contact.leg = static_cast<int>(variant[0]);
     (variant[1] == 0 ? e.contact.leg_friction : e.contact.leg_restitution) = v[0];
   };
+  c.changes = [](const dynamics::StepContext& at, const Values& variant, std::size_t) {
+    const bool friction = variant[1] == 0;
+    return AspectChange{friction ? ContactAspect::mean_friction : ContactAspect::mean_restitution,
+                        at.leg == static_cast<int>(variant[0]) ? 1.0 : 0.0};
+  };
   if (!design.legs_known) c.candidate.undecidable = "which leg landed is not known";
   return c;
 }
@@ -227,6 +232,10 @@ WheelCandidate friction_patch(const WheelDesign& design) {
     e.contact.patch_to = variant[1];
     e.contact.patch_friction = v[0];
   };
+  c.changes = [](const dynamics::StepContext& at, const Values& variant, std::size_t) {
+    return AspectChange{ContactAspect::mean_friction,
+                        at.position >= variant[0] && at.position <= variant[1] ? 1.0 : 0.0};
+  };
   return c;
 }
 
@@ -281,6 +290,11 @@ WheelCandidate ramp_vibration() {
     e.contact.ring_frequency = variant[0];
     e.contact.ring_cosine = v[0];
     e.contact.ring_sine = v[1];
+  };
+  c.changes = [](const dynamics::StepContext& at, const Values& variant, std::size_t parameter) {
+    const double angle = 2 * std::numbers::pi * variant[0] * at.since_previous.value_or(0);
+    const double wave = parameter == 0 ? std::cos(angle) : std::sin(angle);
+    return AspectChange{ContactAspect::loss, at.since_previous ? wave : 0};
   };
   return c;
 }

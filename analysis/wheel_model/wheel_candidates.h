@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "analysis/fitting/transition_model.h"
+#include "analysis/wheel_model/contact_variation.h"
 #include "dynamics/extended_wheel/extended_wheel.h"
 
 namespace metastable::analysis {
@@ -37,6 +38,10 @@ struct WheelCandidate {
   Candidate candidate;
   std::function<void(dynamics::Extension&, const std::vector<double>& variant, const std::vector<double>& values)>
       apply;
+  /// Where all that it does is to change an aspect of contacts, one aspect a variant: by how much from its neutral
+  /// values on. Else it is empty.
+  std::function<AspectChange(const dynamics::StepContext&, const std::vector<double>& variant, std::size_t parameter)>
+      changes = {};
 };
 
 /// Lists all but contact_distribution, which is the recalibration; in the order of the catalogue.

@@ -92,6 +92,10 @@ class WheelTransitions : public TransitionModel {
   const std::vector<Variation>& variations() const override { return variations_; }
   const std::vector<std::string>& notes() const override { return measured_.notes; }
   Evaluation evaluate(std::span<const double> nuisance, std::span<const EffectTerm> terms) const override;
+  std::vector<std::size_t> transitions() const override;
+  std::optional<Addition> addition(const EffectTerm& term, std::size_t parameter) const override;
+  Evaluation evaluate_with(std::span<const double> nuisance, std::span<const EffectTerm> terms,
+                           const Addition& added) const override;
   std::vector<FitStart> starts(std::span<const EffectTerm> terms) const override;
   std::vector<double> rest_chances(std::span<const double> nuisance, std::span<const EffectTerm> terms) const override;
   std::unique_ptr<TransitionModel> simulate(std::span<const double> nuisance, std::span<const EffectTerm> terms,
@@ -226,13 +230,58 @@ WheelHypothesis WheelTransitions::hypothesis(std::span<const double> nuisance,
         h.varied = [&one, term, others = std::move(h.varied)](const CollisionPlace& place,
                                                               dynamics::StepContext& step) {
           if (others) others(place, step);
-          one.apply(place, term, step);
+          vary(step, one.aspect, one.log_ratio(place, term.variant, term.values));
         };
   return h;
 }
 
 Evaluation WheelTransitions::evaluate(std::span<const double> nuisance, std::span<const EffectTerm> terms) const {
   return wheel_likelihood(measured_, events_, hypothesis(nuisance, terms));
+}
+
+std::vector<std::size_t> WheelTransitions::transitions() const {
+  std::vector<std::size_t> all;
+  for (const WheelRun& run : measured_.runs) all.push_back(run.collisions.size());
+  return all;
+}
+
+// Contacts may be changed collision by collision: the numbers are their aspects.
+std::optional<Addition> WheelTransitions::addition(const EffectTerm& term, std::size_t parameter) const {
+  std::function<AspectChange(const CollisionPlace&)> change;
+  for (const WheelCandidate& one : effects_)
+    if (one.candidate.id == term.candidate->id && one.changes)
+      change = [&](const CollisionPlace& at) { return one.changes(at.step, term.variant, parameter); };
+  std::vector<double> unit(term.values.size(), 0.0);
+  unit[parameter] = 1;
+  for (const ContactVariation& one : contact_variations_)
+    if (one.variation.candidate.id == term.candidate->id)
+      change = [&](const CollisionPlace& at) {
+        return AspectChange{one.aspect, one.log_ratio(at, term.variant, unit)};
+      };
+  if (!change) return std::nullopt;
+  Addition added;
+  for (std::size_t t = 0; t < measured_.runs.size(); ++t) {
+    const WheelRun& run = measured_.runs[t];
+    for (std::size_t k = 0; k < run.collisions.size(); ++k) {
+      const AspectChange at = change(collision_place(run, t, k, run.collisions[k], run.collisions[k].before));
+      added.number = static_cast<std::size_t>(at.aspect);
+      added.weights.push_back(at.amount);
+    }
+  }
+  return added;
+}
+
+Evaluation WheelTransitions::evaluate_with(std::span<const double> nuisance, std::span<const EffectTerm> terms,
+                                           const Addition& added) const {
+  std::vector<std::size_t> first{0};  // collision, by trial
+  for (const std::size_t count : transitions()) first.push_back(first.back() + count);
+  WheelHypothesis h = hypothesis(nuisance, terms);
+  h.varied = [&, others = std::move(h.varied)](const CollisionPlace& place, dynamics::StepContext& step) {
+    if (others) others(place, step);
+    vary(step, static_cast<ContactAspect>(added.number),
+         added.weights[first[place.trial] + static_cast<std::size_t>(place.number) - 1]);
+  };
+  return wheel_likelihood(measured_, events_, h);
 }
 
 // A recalibration whose stated contact is far astray starts from a coarse lattice of means, too: there the likelihood

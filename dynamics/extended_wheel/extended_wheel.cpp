@@ -244,10 +244,12 @@ CollisionChange ExtendedWheel::change(const StepContext& context, double omega) 
     change.friction_ratio *= e.leg_friction;
     change.restitution_ratio *= e.leg_restitution;
   }
+  change.loss_ratio += context.loss_added;
   if ((e.ring_cosine != 0 || e.ring_sine != 0) && context.since_previous) {
     const double angle = 2 * pi * e.ring_frequency * *context.since_previous;
-    change.loss_ratio = std::max(0.05, 1 + e.ring_cosine * std::cos(angle) + e.ring_sine * std::sin(angle));
+    change.loss_ratio += e.ring_cosine * std::cos(angle) + e.ring_sine * std::sin(angle);
   }
+  change.loss_ratio = std::max(0.05, change.loss_ratio);
   change.friction_ratio = std::max(0.02, change.friction_ratio);
   return change;
 }

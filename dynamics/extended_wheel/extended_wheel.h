@@ -87,6 +87,7 @@ struct StepContext {
   double friction_ratio = 1;                  ///< of this collision's mu
   double friction_scatter = 1;                ///< ratio of the deviation of its mu from the mean
   double restitution_ratio = 1;               ///< of this collision's eta
+  double loss_added = 0;                      ///< to the ratio of what this collision loses
 };
 
 /// Extends one wheel on one ramp. The stance conserves energy but for the resisting torques, whose work is integrated

@@ -333,7 +333,11 @@ void add_landings(NextTouchSum& sum, const SettledLanding& landing, const Settle
 
 }  // namespace
 
-double slide_score(double share) { return boost::math::quantile(boost::math::students_t(3), share); }
+double slide_score(double share) {
+  using boost::math::policies::policy, boost::math::policies::promote_double;
+  using Policy = policy<promote_double<false>>;  // with long double it takes seven times as long
+  return boost::math::quantile(boost::math::students_t_distribution<double, Policy>(3), share);
+}
 
 double SettledLanding::plastic_loss(double friction) const {
   const double d = struck_ahead(), h = struck_height();
