@@ -10,6 +10,7 @@ namespace {
 
 constexpr int speeds = 15, grid_restitutions = 13;
 constexpr double sds = 4, least_width = 0.3;  // of the restitutions around their mean; [1]
+constexpr double single_width = 1e-8;         // of mu_r: the grid holds it in single precision
 constexpr double just_above = 1e-7;           // mu_r, of the first place
 // The places at which a wheel of so much more J is followed, for the changes with J: every so many speeds and
 // restitutions.
@@ -21,12 +22,12 @@ constexpr double most_rate = 0.03;  // of the share kept with ln J, beside what 
 void fill(LandingShares& grid, const SettledMap& map, int leg, int row) {
   LandingShares::Leg& of_leg = grid.legs[static_cast<std::size_t>(leg)];
   const double eta = grid.restitution.at(row);
-  double one = 0, two = 0;  // mu_r at the speeds before
+  std::vector<double> speeds_of_grid;
+  for (int i = 0; i < grid.speed.count; ++i) speeds_of_grid.push_back(grid.speed.at(i));
+  const std::vector<double> found = map.followed_resting_frictions(leg, speeds_of_grid, eta, single_width);
   for (int i = 0; i < grid.speed.count; ++i) {
     const double omega = grid.speed.at(i), square = omega * omega;
-    const double found = map.followed_resting_friction(leg, omega, eta, two > 0 ? 2 * one - two : one);
-    const double resting = std::min(found, of_leg.sticking - 2e-6);
-    if (found < of_leg.sticking) two = one, one = found;
+    const double resting = std::min(found[static_cast<std::size_t>(i)], of_leg.sticking - 2e-6);
     const std::size_t cell = grid.cell(leg, i, row);
     grid.resting[cell] = static_cast<float>(resting);
     for (int k = 0; k < LandingShares::parts; ++k) {

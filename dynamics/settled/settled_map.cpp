@@ -60,6 +60,8 @@ double rising_root(const F& value, double low, double at_low, double high, doubl
   return high;
 }
 
+constexpr double resting_width = 1e-10;  // of mu_r, where a table reads it
+
 // Says what a value will be at the next of evenly spread places, from those before.
 class Trend {
  public:
@@ -273,8 +275,8 @@ double SettledMap::standstill(int leg, double eta, const std::function<void()>& 
   return rising_root(value, low, at_low, high, at_high, 1e-10 * high);
 }
 
-// @param guess from which to start, 0: none; @param off how far off it may be
-double SettledMap::solve_resting(int leg, double omega, double eta, double guess, double off,
+// @param guess from which to start, 0: none; @param off how far off it may be; @param width to which it is found
+double SettledMap::solve_resting(int leg, double omega, double eta, double guess, double off, double width,
                                  const std::function<void()>& tell) const {
   const double barrier = motion_.foot(leg).barrier_squared();
   const auto value = [&](double mu) {
@@ -303,7 +305,7 @@ double SettledMap::solve_resting(int leg, double omega, double eta, double guess
     at_low = value(low);
   }
   if (at_low >= 0) return 0;
-  return rising_root(value, low, at_low, high, at_high, smooth ? 1e-10 : 1e-6);
+  return rising_root(value, low, at_low, high, at_high, smooth ? width : 1e-6);
 }
 
 // Finds the bend at two speeds and three restitutions: where the landing has risen by a quarter of its rise over [mu_r,
@@ -319,7 +321,7 @@ void SettledMap::find_bend(SettledTable& table, int leg, const std::function<voi
     std::array<double, 2> omega{}, found{};
     for (std::size_t s = 0; s < 2; ++s) {
       omega[s] = from + (std::min(range.omega_high, from + 4) - from) * (s == 0 ? 0.3 : 0.8);
-      const double resting = solve_resting(leg, omega[s], eta[j], 0, 0, tell);
+      const double resting = solve_resting(leg, omega[s], eta[j], 0, 0, resting_width, tell);
       const auto kept = [&](double part) {
         tell();
         return motion_.land(leg, omega[s], {eta[j], resting + part * (sticking - resting)}).carried_squared;
@@ -366,7 +368,7 @@ void SettledMap::find_edges(SettledTable& table, int leg, int row, const std::fu
   for (int i = 0; i < table.speeds; ++i) {
     const double omega = table.speed(still, static_cast<double>(i) / (table.speeds - 1));
     double* edge = &table.edges[static_cast<std::size_t>((row * table.speeds + i) * (stops + 1))];
-    double resting = solve_resting(leg, omega, eta, trend[stops].next(), trend[stops].off(), tell);
+    double resting = solve_resting(leg, omega, eta, trend[stops].next(), trend[stops].off(), resting_width, tell);
     if (!(resting < table.sticking)) resting = table.sticking - 1e-9;
     trend[stops].add(edge[stops] = resting);
     for (int n = 0; n < stops; ++n) {
@@ -525,7 +527,18 @@ double SettledMap::resting_friction(int leg, double omega, double eta) const {
 double SettledMap::followed_resting_friction(int leg, double omega, double eta, double guess,
                                              const std::function<void()>& tell) const {
   constexpr double off = 2e-4;
-  return solve_resting(leg, omega, eta, guess, off, tell);
+  return solve_resting(leg, omega, eta, guess, off, resting_width, tell);
+}
+
+std::vector<double> SettledMap::followed_resting_frictions(int leg, std::span<const double> omega, double eta,
+                                                           double width) const {
+  std::vector<double> all;
+  Trend trend;
+  for (const double one : omega) {
+    all.push_back(solve_resting(leg, one, eta, trend.next(), trend.off(), width, [] {}));
+    if (all.back() < sticking_[static_cast<std::size_t>(leg)]) trend.add(all.back());
+  }
+  return all;
 }
 
 MappedLanding SettledMap::follow(int leg, double omega, const Contact& contact) const {

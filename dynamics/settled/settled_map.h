@@ -6,6 +6,7 @@
 #include <memory>
 #include <optional>
 #include <stdexcept>
+#include <span>
 #include <vector>
 
 #include "dynamics/settled/settled_motion.h"
@@ -86,6 +87,9 @@ class SettledMap {
   /// @param tell  called before each of them; it may throw to stop
   double followed_resting_friction(
       int leg, double omega, double eta, double guess = 0, const std::function<void()>& tell = [] {}) const;
+  /// Returns mu_r at speeds that rise by equal steps [rad/s], each to `width`.
+  std::vector<double> followed_resting_frictions(int leg, std::span<const double> omega, double eta,
+                                                 double width) const;
   /// Returns the table at one restitution, to read many landings from; nothing where there is no table.
   std::optional<SettledSlice> slice(int leg, double eta) const;
   /// Returns omega-^2 at the next touch [rad^2/s^2], for a landing that does not rest.
@@ -105,7 +109,7 @@ class SettledMap {
   void find_bend(SettledTable& table, int leg, const std::function<void()>& tell) const;
   void check();
   double standstill(int leg, double eta, const std::function<void()>& tell) const;
-  double solve_resting(int leg, double omega, double eta, double guess, double off,
+  double solve_resting(int leg, double omega, double eta, double guess, double off, double width,
                        const std::function<void()>& tell) const;
 
   SettledMotion motion_;
