@@ -48,8 +48,8 @@ struct MachineHypothesis {
   double wild = 0;                       ///< share of rows that say nothing of the state
 };
 
-/// A number of a hypothesis that may be more by so much in each transition: one of the map's values, then what a state
-/// is pushed by, then the logarithm of the scores' scatter.
+/// Adds to a number of a hypothesis, transition by transition. Its numbers are the values of the map, then what each
+/// state is pushed by, then the logarithm of the scores' scatter.
 /// @param states  how many the machine has
 void add(MachineHypothesis& hypothesis, std::size_t states, const Addition& added);
 

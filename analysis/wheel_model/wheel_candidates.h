@@ -38,8 +38,8 @@ struct WheelCandidate {
   Candidate candidate;
   std::function<void(dynamics::Extension&, const std::vector<double>& variant, const std::vector<double>& values)>
       apply;
-  /// Where all that it does is to change an aspect of contacts, one aspect a variant: by how much from its neutral
-  /// values on. Else it is empty.
+  /// Returns by how much a unit of a parameter, from its neutral value on, changes an aspect of a contact. Each variant
+  /// changes one aspect. An effect that does more than that has no such function.
   std::function<AspectChange(const dynamics::StepContext&, const std::vector<double>& variant, std::size_t parameter)>
       changes = {};
 };

@@ -5,6 +5,7 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <cmath>
 #include <memory>
 #include <optional>
 #include <string>
@@ -12,6 +13,8 @@
 
 #include "analysis/fitting/model_fit.h"
 #include "analysis/machine_model/machine_transitions.h"
+#include "analysis/wheel_model/wheel_transitions.h"
+#include "tests/analysis/diagnosed.h"
 #include "tests/analysis/machine_model/machines.h"
 
 namespace metastable::analysis::test {
@@ -51,7 +54,8 @@ std::vector<Compared> compared(const TransitionModel& model) {
       EffectTerm term{one, one->variants.back(), {}};
       for (const FreeParameter& parameter : one->parameters) term.values.push_back(parameter.neutral);
       const std::optional<Addition> addition = model.addition(term, p);
-      if (!addition) continue;
+      const auto counts = [](double weight) { return std::abs(weight) > 1e-9; };
+      if (!addition || std::ranges::none_of(addition->weights, counts)) continue;
       TransitionResponses responses(model, at, addition->number, one->parameters[p].step);
       for (std::size_t k = 0; k < responses.evaluations(); ++k) responses.evaluate(k);
       if (responses.evaluations() == 0) continue;
@@ -71,6 +75,17 @@ TEST(TransitionResponses, SumToTheSlopesOfEveryAddition) {
   // b by phase, drift, stretch and label; means and scatter by state, phase, order, number, place and label
   EXPECT_GE(all.size(), 50u);
   for (const Compared& one : all) EXPECT_LT(one.off, 0.01) << one.effect;
+}
+
+// A wheel's contacts are varied collision by collision: by what has no name, and by three effects of the catalogue.
+TEST(TransitionResponses, SumToTheSlopesOfAWheelsVariations) {
+  const auto design = wheel_transitions(wheel_design(60, 14));
+  const std::vector<Compared> all = compared(*design->simulate(nominal_values(*design), {}, 5));
+  for (const char* effect : {"leg_contact", "friction_patch", "ramp_vibration", "mean friction by position",
+                             "mean restitution by leg in order", "scatter of friction by trial"})
+    EXPECT_EQ(std::ranges::count(all, effect, &Compared::effect) > 0, true) << effect;
+  // Differences to one side err by as much where the whole column is moved.
+  for (const Compared& one : all) EXPECT_LT(one.off, 0.03) << one.effect;
 }
 
 // With errors of measurement as large as the noise an event remembers a dozen transitions.
