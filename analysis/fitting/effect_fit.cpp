@@ -54,6 +54,23 @@ bool is_far_off(const std::vector<double>& scores) {
   return sum > count * widest + sds * std::sqrt(2 * count);
 }
 
+// Fits the best variant from its neutral values, where the scan has its slopes.
+Fit fit_from_neutral(const TransitionModel& model, const Fit& base, const ScannedEffect& scanned, FitOptions options) {
+  std::vector<EffectTerm> terms = base.terms;
+  terms.push_back({scanned.candidate, scanned.candidate->variants[scanned.best], {}});
+  for (const FreeParameter& p : scanned.candidate->parameters) terms.back().values.push_back(p.neutral);
+  Derivatives joined = base.derivatives;
+  const Eigen::Index held = joined.slope.cols(), more = scanned.columns.slope.cols();
+  joined.slope.conservativeResize(Eigen::NoChange, held + more);
+  joined.change.conservativeResize(Eigen::NoChange, held + more);
+  joined.slope.rightCols(more) = scanned.columns.slope;
+  joined.change.rightCols(more) = scanned.columns.change;
+  joined.steps.insert(joined.steps.end(), scanned.columns.steps.begin(), scanned.columns.steps.end());
+  options.evaluation = &base.evaluation;
+  options.derivatives = &joined;
+  return fit(model, base.nuisance, terms, options);
+}
+
 }  // namespace
 
 Effort effort_for(const TransitionModel& model, const Fit& recalibrated) {
@@ -78,27 +95,6 @@ EffectTerm term_at(const ScannedEffect& scanned, std::size_t variant) {
   }
   return term;
 }
-
-namespace {
-
-// Fits from the neutral values, where the scan has the slopes of the best variant.
-Fit fit_from_neutral(const TransitionModel& model, const Fit& base, const ScannedEffect& scanned, FitOptions options) {
-  std::vector<EffectTerm> terms = base.terms;
-  terms.push_back({scanned.candidate, scanned.candidate->variants[scanned.best], {}});
-  for (const FreeParameter& p : scanned.candidate->parameters) terms.back().values.push_back(p.neutral);
-  Derivatives joined = base.derivatives;
-  const Eigen::Index held = joined.slope.cols(), more = scanned.columns.slope.cols();
-  joined.slope.conservativeResize(Eigen::NoChange, held + more);
-  joined.change.conservativeResize(Eigen::NoChange, held + more);
-  joined.slope.rightCols(more) = scanned.columns.slope;
-  joined.change.rightCols(more) = scanned.columns.change;
-  joined.steps.insert(joined.steps.end(), scanned.columns.steps.begin(), scanned.columns.steps.end());
-  options.evaluation = &base.evaluation;
-  options.derivatives = &joined;
-  return fit(model, base.nuisance, terms, options);
-}
-
-}  // namespace
 
 Fit fit_one_more(const TransitionModel& model, const Effort& effort, const Fit& base, const ScannedEffect& scanned,
                  bool gain_alone) {

@@ -22,7 +22,8 @@ namespace {
 
 constexpr double largest_step = 0.1, small_step = 0.05;  // of a difference, in standard errors
 constexpr std::size_t most_scanned = 24;                 // variants of an effect that are scanned beside another one
-constexpr std::size_t fewest_columns = 4;                // that add to one number, for its responses
+// Where fewer columns than this add to one number, each is differenced by itself.
+constexpr std::size_t fewest_columns = 4;
 constexpr double far_out = 0.03;  // share of the draws beyond which a tail follows its law instead of their count
 
 // Returns the root of the inverse of an effect's information, that of its priors included, in the directions that the
@@ -122,7 +123,7 @@ ScannedEffect list_terms(const Candidate& candidate, const ScanBeside& beside, E
   return effect;
 }
 
-// One column of a scan: a parameter of a term.
+// Says which parameter of a term a column of the scan belongs to.
 struct ScannedColumn {
   Eigen::Index column;
   const EffectTerm* term;
@@ -146,25 +147,21 @@ void differentiate(const TransitionModel& model, const Fit& fit, const ScannedCo
     moved.push_back(*scanned.term);
     moved.back().values[scanned.parameter] += step;
     const Evaluation there = model.evaluate(fit.nuisance, moved);
-    for (Eigen::Index k = 0; k < all.slope.rows(); ++k) {
-      const auto event = static_cast<std::size_t>(k);
-      all.slope(k, scanned.column) = (there.log_density[event] - fit.evaluation.log_density[event]) / step;
-      all.change(k, scanned.column) = (there.score[event] - fit.evaluation.score[event]) / step;
-    }
+    fill_differences(fit.evaluation, there, step, scanned.column, all);
     const double resolved = 1 / std::sqrt(std::max(1e-300, all.change.col(scanned.column).squaredNorm()));
     if (step < largest_step * resolved) break;
     step = small_step * resolved;
   }
 }
 
-// A number of the model, the columns that add to it, and the largest of their steps.
+// Holds the columns that add to one number of the model, the largest of their steps, and what events answer to it.
 struct AddedTo {
   std::vector<ScannedColumn> columns;
   double step = 0;
   std::unique_ptr<TransitionResponses> responses = {};
 };
 
-// Sorts columns by the number that they add to. Those that do more than add come back.
+// Sorts columns by the number that they add to, and returns those that do more than add.
 std::vector<ScannedColumn> sort_out(const TransitionModel& model, const std::vector<ScannedColumn>& columns,
                                     const ScanBeside& beside, std::map<std::size_t, AddedTo>& numbers) {
   std::vector<ScannedColumn> others;
@@ -184,7 +181,7 @@ std::vector<ScannedColumn> sort_out(const TransitionModel& model, const std::vec
   return others;
 }
 
-// Fills the columns that are sums of what events answer to single transitions. Returns the others.
+// Fills the columns that are sums of what events answer to single transitions, and returns the others.
 std::vector<ScannedColumn> fill_by_responses(const TransitionModel& model, const Fit& fit,
                                              const std::vector<ScannedColumn>& columns, const ScanBeside& beside,
                                              int threads, Derivatives& all) {

@@ -17,7 +17,7 @@ struct ScannedEffect {
   std::vector<Eigen::VectorXd> start;  ///< by variant: the values they point to
   std::vector<Eigen::Index> first;     ///< by variant: first of its columns
   std::size_t best = 0;                ///< variant
-  Derivatives columns = {};            ///< of the best variant's parameters, at their neutral values
+  Derivatives columns = {};            ///< those of the best variant, at neutral values
 };
 
 /// Holds the efficient scores (nuisances projected out) of all candidates at a fit.

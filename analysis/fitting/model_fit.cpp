@@ -23,9 +23,10 @@ constexpr double dampings[] = {0, 1e-4, 1e-3, 1e-2, 0.1, 1}, least_kept = 0.25;
 // nothing: of the order of that share squared.
 constexpr double small_rise = 3, as_foretold = 0.1;
 constexpr int most_halvings = 7, few_halvings = 3;  // of a step; of one that is damped more where another failed
-constexpr double much_more = 1.25, longest = 8;     // than a step foretold; times a step
-constexpr int rough_steps = 2;                      // by slopes of another place
-constexpr double difference_share = 0.05;           // step of a difference, of what the data resolve
+// A step that rises by so many times what it foretold is too short. It is made longer, by so many times at most.
+constexpr double much_more = 1.25, longest = 8;
+constexpr int rough_steps = 2;             // A fit that is only looked at takes so many steps by another one's slopes.
+constexpr double difference_share = 0.05;  // step of a difference, of what the data resolve
 
 // Holds all parameters of a hypothesis in one vector.
 class Point {
@@ -309,6 +310,15 @@ Derivatives derivatives(const TransitionModel& model, const std::vector<double>&
                         const std::vector<EffectTerm>& terms, const Evaluation& here, bool with_nuisances) {
   Point point(model, nuisance, terms, with_nuisances);
   return differences(point, here);
+}
+
+void fill_differences(const Evaluation& here, const Evaluation& there, double step, Eigen::Index column,
+                      Derivatives& all) {
+  for (Eigen::Index row = 0; row < all.slope.rows(); ++row) {
+    const auto event = static_cast<std::size_t>(row);
+    all.slope(row, column) = (there.log_density[event] - here.log_density[event]) / step;
+    all.change(row, column) = (there.score[event] - here.score[event]) / step;
+  }
 }
 
 Fit stepped(const TransitionModel& model, const Fit& near, const std::vector<EffectTerm>& terms) {

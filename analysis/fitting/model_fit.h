@@ -51,7 +51,8 @@ struct FitOptions {
   std::vector<char> count;  ///< by trial: 0 leaves its events out; empty: all
   bool refit_nuisances = true;
   int most_iterations = 25;
-  /// What is known where it starts: the evaluation, and derivatives for the first step.
+  /// A caller who knows the evaluation at the start, or the derivatives for the first step, spares the fit from finding
+  /// them.
   const Evaluation* evaluation = nullptr;
   const Derivatives* derivatives = nullptr;
   /// If true, a step that rises about as it foretold is the last. The fit's derivatives are those before it, then.
@@ -82,6 +83,11 @@ Derivatives derivatives(const TransitionModel& model, const std::vector<double>&
 /// those of the scores, and those of what log densities are more than the scores'. It has not converged, but its
 /// likelihood says what a fit would come to.
 Fit stepped(const TransitionModel& model, const Fit& near, const std::vector<EffectTerm>& terms);
+
+/// Fills a column with the slopes and changes of events between two evaluations that a step of a parameter lies
+/// between.
+void fill_differences(const Evaluation& here, const Evaluation& there, double step, Eigen::Index column,
+                      Derivatives& all);
 
 /// Returns the information of columns: sum over counted events of change change^T + (slope + z change)(...)^T.
 /// @param weights  by event, 1 or 0

@@ -129,7 +129,7 @@ struct EffectTerm {
   std::vector<double> values;
 };
 
-/// What a unit of an effect's parameter adds to one number of the model, transition by transition.
+/// Says what a unit of an effect's parameter adds to one number of the model, transition by transition.
 struct Addition {
   std::size_t number = 0;       ///< which of the numbers that the model lets differ between transitions
   std::vector<double> weights;  ///< [transitions], of all trials in their order

@@ -7,10 +7,11 @@
 namespace metastable::analysis {
 namespace {
 
-constexpr std::size_t apart = 12;    // transitions between those that the probe moves
-constexpr double forgotten = 1e-5;   // share of the information on a transition that later events may hold unseen
-constexpr double small_move = 0.05;  // of the number, in standard errors
-constexpr double too_large = 2;      // times that move, that a given step may be
+constexpr std::size_t apart = 12;  // The probe moves one of so many transitions.
+// Later events that are not asked may hold this share of the information on a transition.
+constexpr double forgotten = 1e-5;
+constexpr double small_move = 0.05;  // A number is moved by so many standard errors, where the given step is more than
+constexpr double too_large = 2;      // so many times that.
 
 // Returns by lag the mean square of what events answer to a transition so many before theirs.
 std::array<double, apart> answers_by_lag(const TransitionModel& model, const Derivatives& answers) {
@@ -32,7 +33,7 @@ TransitionResponses::TransitionResponses(const TransitionModel& model, const Fit
   for (const std::size_t count : model.transitions()) first_.push_back(first_.back() + count);
   const auto events = static_cast<Eigen::Index>(model.events().size());
   answers_ = {Eigen::MatrixXd::Zero(events, 1), Eigen::MatrixXd::Zero(events, 1)};
-  differ(moved(apart, 0), 0);
+  fill_differences(fit.evaluation, moved(apart, 0), step_, 0, answers_);
   const std::array<double, apart> by_lag = answers_by_lag(model, answers_);
   double whole = 0, later = 0;
   for (const double one : by_lag) whole += one;
@@ -53,15 +54,9 @@ Evaluation TransitionResponses::moved(std::size_t every, std::size_t first) cons
   return model_.evaluate_with(fit_.nuisance, fit_.terms, added);
 }
 
-void TransitionResponses::differ(const Evaluation& there, Eigen::Index column) {
-  for (Eigen::Index row = 0; row < answers_.slope.rows(); ++row) {
-    const auto event = static_cast<std::size_t>(row);
-    answers_.slope(row, column) = (there.log_density[event] - fit_.evaluation.log_density[event]) / step_;
-    answers_.change(row, column) = (there.score[event] - fit_.evaluation.score[event]) / step_;
-  }
+void TransitionResponses::evaluate(std::size_t which) {
+  fill_differences(fit_.evaluation, moved(lags_, which), step_, static_cast<Eigen::Index>(which), answers_);
 }
-
-void TransitionResponses::evaluate(std::size_t which) { differ(moved(lags_, which), static_cast<Eigen::Index>(which)); }
 
 void TransitionResponses::fill(const Addition& addition, Eigen::Index column, Derivatives& all) const {
   for (Eigen::Index row = 0; row < all.slope.rows(); ++row) {

@@ -1,6 +1,7 @@
 #pragma once
-// How events answer to a number that is moved in single transitions. Whatever adds to that number in some of the
-// transitions, by phase, by place or by trial, is a sum of such answers: its slopes need no evaluation of their own.
+// Finds how events answer to a number that is moved in single transitions. An effect that adds to that number in some
+// of the transitions, by phase, by place or by trial, has slopes that are sums of such answers. They need no evaluation
+// of their own.
 
 #include <cstddef>
 #include <vector>
@@ -28,7 +29,6 @@ class TransitionResponses {
 
  private:
   Evaluation moved(std::size_t every, std::size_t first) const;
-  void differ(const Evaluation& there, Eigen::Index column);
 
   const TransitionModel& model_;
   const Fit& fit_;

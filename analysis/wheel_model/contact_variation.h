@@ -28,11 +28,11 @@ CollisionPlace collision_place(const WheelRun& run, std::size_t trial, std::size
 
 enum class ContactAspect { mean_friction, mean_restitution, scatter_of_friction, loss };
 
-/// Changes an aspect of a step's contact by an amount: that of the logarithm, of which far covariates may not make more
-/// than 3, and of a loss itself.
+/// Changes an aspect of a step's contact. The amount is added to a loss as it stands, and to the logarithm of any other
+/// aspect, in which it counts for 3 at most, because covariates may lie far off.
 void vary(dynamics::StepContext& step, ContactAspect aspect, double amount);
 
-/// The amount by which an effect changes an aspect of one collision's contact, a unit of one of its parameters.
+/// Says by how much a unit of an effect's parameter changes an aspect of one collision's contact.
 struct AspectChange {
   ContactAspect aspect = ContactAspect::mean_friction;
   double amount = 0;

@@ -10,7 +10,7 @@ namespace {
 
 constexpr int speeds = 15, grid_restitutions = 13;
 constexpr double sds = 4, least_width = 0.3;  // of the restitutions around their mean; [1]
-constexpr double single_width = 1e-8;         // of mu_r: the grid holds it in single precision
+constexpr double single_width = 1e-8;         // mu_r is found to this, because the grid holds it in single precision
 constexpr double just_above = 1e-7;           // mu_r, of the first place
 // The places at which a wheel of so much more J is followed, for the changes with J: every so many speeds and
 // restitutions.

@@ -60,7 +60,7 @@ double rising_root(const F& value, double low, double at_low, double high, doubl
   return high;
 }
 
-constexpr double resting_width = 1e-10;  // of mu_r, where a table reads it
+constexpr double resting_width = 1e-10;  // Tables and those who ask for one mu_r get it to this.
 
 // Says what a value will be at the next of evenly spread places, from those before.
 class Trend {

@@ -93,6 +93,11 @@ def diagnosed(metastable, folder):
     return metastable.diagnose(runs, machine), time.process_time() - start, *asked
 
 
+def causes(answer):
+    """Names what is likelier at work than not."""
+    return "+".join("/".join(one.effects) for one in answer.at_work if one.probability > 0.5) or "none"
+
+
 def main():
     options = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     options.add_argument("--python", required=True, help="folder of the package metastable")
@@ -104,9 +109,8 @@ def main():
     for folder in given.folders:
         answer, seconds, calls, rows = diagnosed(metastable, folder)
         own = metastable.diagnose(str(folder))
-        causes = ["+".join("/".join(one.effects) for one in a.at_work if one.probability > 0.5) or "none" for a in (answer, own)]
-        print(f"{folder.name},{answer.verdict},{causes[0]},{seconds:.0f},{calls},{rows},{own.verdict},{causes[1]}",
-              flush=True)
+        print(f"{folder.name},{answer.verdict},{causes(answer)},{seconds:.0f},{calls},{rows},"
+              f"{own.verdict},{causes(own)}", flush=True)
 
 
 if __name__ == "__main__":

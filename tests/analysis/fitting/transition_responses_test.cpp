@@ -20,7 +20,7 @@
 namespace metastable::analysis::test {
 namespace {
 
-// Runs with phases, places and a label, of which one trial is short and values are missing.
+// The runs have phases, places and a label; one trial is short, and some values are missing.
 std::unique_ptr<TransitionModel> model_of(double error) {
   MachineRuns runs =
       scalar_runs(30, 17, 1.5, error, 3, [](double x, double z, std::size_t) { return 0.8 * x + 0.3 + 0.2 * z; });
@@ -72,7 +72,8 @@ std::vector<Compared> compared(const TransitionModel& model) {
 
 TEST(TransitionResponses, SumToTheSlopesOfEveryAddition) {
   const std::vector<Compared> all = compared(*model_of(0.05));
-  // b by phase, drift, stretch and label; means and scatter by state, phase, order, number, place and label
+  // These are b by phase, drift, stretch and label, and means and scatter by state, phase, order, number, place and
+  // label.
   EXPECT_GE(all.size(), 50u);
   for (const Compared& one : all) EXPECT_LT(one.off, 0.01) << one.effect;
 }
@@ -83,7 +84,7 @@ TEST(TransitionResponses, SumToTheSlopesOfAWheelsVariations) {
   const std::vector<Compared> all = compared(*design->simulate(nominal_values(*design), {}, 5));
   for (const char* effect : {"leg_contact", "friction_patch", "ramp_vibration", "mean friction by position",
                              "mean restitution by leg in order", "scatter of friction by trial"})
-    EXPECT_EQ(std::ranges::count(all, effect, &Compared::effect) > 0, true) << effect;
+    EXPECT_GT(std::ranges::count(all, effect, &Compared::effect), 0) << effect;
   // Differences to one side err by as much where the whole column is moved.
   for (const Compared& one : all) EXPECT_LT(one.off, 0.03) << one.effect;
 }
