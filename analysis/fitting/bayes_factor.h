@@ -17,14 +17,14 @@ double evidence_of(const ScannedEffect& scanned, double gain, const Rules& rules
 /// Returns the evidence of an effect without variants. @param parameters  >= 0
 double evidence_of_gain(double gain, double parameters, const Rules& rules);
 
-/// The gain, 2 Delta log likelihood of one fit over another, in stances and in everything else.
-struct PhaseGain {
-  double collisions = 0, stances = 0;
-};
 PhaseGain phase_gain(const TransitionModel& model, const Fit& better, const Fit& worse);
 
 /// Returns the gain that counts for a second effect: what it gained beyond Rules::square_error() of what the first one
 /// gained in the same phase. @param exact  the part of the first that has no error of form (exact_part)
 double earned(const TransitionModel& model, const Fit& pair, const Fit& first, const Fit& exact, const Rules& rules);
+
+/// Returns what the scores promise that a second effect will have earned. @param scanned  beside the first
+double promised_to_earn(const TransitionModel& model, const ScannedEffect& scanned, const Fit& first, const Fit& exact,
+                        const Rules& rules);
 
 }  // namespace metastable::analysis

@@ -15,6 +15,7 @@ constexpr double far_gain = 100;       // promised by the best variant, beyond w
 constexpr double furthest_start = 0.25;  // share of a parameter's range
 constexpr double small_start = 0.1;      // share of a size worth starting from, where the scores' start was a bad one
 constexpr double worth_moving = 0.2;     // rise of the log likelihood
+constexpr int most_refinements = 10;     // of a variant, while it moves
 
 // Says whether two variants are two kinds of one thing, as a leg's friction and its restitution: they differ in one
 // entry only, of which the list has no third value.
@@ -126,25 +127,42 @@ Fit fit_one_more(const TransitionModel& model, const Effort& effort, const Fit& 
 }
 
 void refine_variant(const TransitionModel& model, const Effort& effort, Fit& best) {
-  const std::vector<double> spacing = best.terms.back().candidate->refine;
-  bool moved = false;
-  double share = 0.5;
-  for (int round = 0; round < effort.refinements; ++round, share /= 2)
-    for (std::size_t entry = 0; entry < spacing.size(); ++entry) {
-      if (spacing[entry] == 0) continue;
-      for (const double sign : {1.0, -1.0}) {
-        std::vector<EffectTerm> terms = best.terms;
-        terms.back().variant[entry] += sign * share * spacing[entry];
-        Fit tried = stepped(model, best, terms);
-        if (!(tried.penalised > best.penalised + worth_moving)) continue;
-        best = std::move(tried);
-        moved = true;
-        break;
-      }
+  const Candidate& candidate = *best.terms.back().candidate;
+  bool moved = false, moving = true;
+  const auto move_to = [&](std::size_t entry, double value) {
+    std::vector<EffectTerm> terms = best.terms;
+    terms.back().variant[entry] = value;
+    Fit tried = stepped(model, best, terms);
+    const double penalised = tried.penalised;
+    if (penalised > best.penalised + worth_moving) {
+      best = std::move(tried);
+      moved = moving = true;
     }
-  if (moved)
-    best = fit(model, best.nuisance, best.terms,
-               {.count = {}, .refit_nuisances = true, .most_iterations = effort.most_iterations});
+    return penalised;
+  };
+  double share = 0.5;
+  for (int round = 0; round < effort.refinements || (moving && round < most_refinements); ++round, share /= 2) {
+    moving = false;
+    for (std::size_t entry = 0; entry < candidate.refine.size(); ++entry) {
+      const double here = best.terms.back().variant[entry], step = share * candidate.refine[entry];
+      if (step == 0) continue;
+      const double middle = best.penalised, after = move_to(entry, here + step);
+      if (best.penalised > middle) continue;
+      const double before = move_to(entry, here - step);
+      if (best.penalised > middle) continue;
+      // The top of the parabola through the three.
+      const double bend = after - 2 * middle + before, slope = 0.5 * (after - before);
+      if (bend < 0 && -0.5 * slope * slope / bend > worth_moving) move_to(entry, here - step * slope / bend);
+    }
+  }
+  if (!moved) return;
+  // Another kind may suit where the list has no such values.
+  for (std::size_t entry = 0; entry < candidate.refine.size(); ++entry)
+    if (candidate.refine[entry] == 0)
+      for (const std::vector<double>& listed : candidate.variants)
+        if (listed[entry] != best.terms.back().variant[entry]) move_to(entry, listed[entry]);
+  best = fit(model, best.nuisance, best.terms,
+             {.count = {}, .refit_nuisances = true, .most_iterations = effort.most_iterations});
 }
 
 }  // namespace metastable::analysis

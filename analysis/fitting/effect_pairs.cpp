@@ -54,7 +54,7 @@ bool is_tried(const std::vector<Try>& tries, std::size_t leader, const Candidate
 
 void add_promising(const RankingProblem& problem, const EffectScan& scan, const SingleEffects& singles,
                    std::size_t leader, std::vector<Try>& tries) {
-  for (ScannedEffect& second : promising_beside(problem, scan, singles.causes[leader]))
+  for (ScannedEffect& second : promising_beside(problem, singles, scan, singles.causes[leader]))
     tries.push_back({leader, std::move(second)});
 }
 
@@ -170,7 +170,8 @@ void complete_pairs(const RankingProblem& problem, EffectPairs& ranked, ScansBes
   for (const EffectTerm& term : best->terms) {
     const std::size_t leader = problem.index_of(term.candidate);
     if (!ranked.singles.causes[leader].fitted()) continue;
-    for (const ScannedEffect* effect : about_as_promising(problem, beside.of(ranked.singles, leader)))
+    for (const ScannedEffect* effect :
+         about_as_promising(problem, ranked.singles, beside.of(ranked.singles, leader), ranked.singles.causes[leader]))
       if (std::ranges::none_of(ranked.pairs, [&](const RankedCause& pair) {
             return extends(pair.terms, {term, term_at(*effect, effect->best)});
           }))
@@ -194,6 +195,7 @@ EffectPairs rank_effect_pairs(const RankingProblem& problem, SingleEffects singl
   refit_from_pairs(problem, ranked, beside);
   refine_paired(problem, ranked, beside);
   complete_pairs(problem, ranked, beside);
+  finish_leading(problem, ranked.pairs);
   return ranked;
 }
 

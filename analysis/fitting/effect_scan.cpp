@@ -212,8 +212,9 @@ std::vector<ScannedColumn> fill_by_responses(const TransitionModel& model, const
   return others;
 }
 
-// Projects what the fitted parameters could take up out of scores and information, which makes them efficient.
-void project(const TransitionModel& model, const Fit& fit, const Derivatives& all, EffectScan& scan) {
+// Projects what the fitted parameters could take up out of scores and information, which makes them efficient, and
+// returns the columns without it.
+Derivatives project(const TransitionModel& model, const Fit& fit, const Derivatives& all, EffectScan& scan) {
   const Eigen::Index events = all.slope.rows();
   const Eigen::Map<const Eigen::VectorXd> z(fit.evaluation.score.data(), events);
   const Eigen::MatrixXd stretch = all.slope + z.asDiagonal() * all.change;
@@ -229,10 +230,11 @@ void project(const TransitionModel& model, const Fit& fit, const Derivatives& al
   scan.information = all.change.transpose() * all.change + stretch.transpose() * stretch;
   scan.whole = scan.information.diagonal();
   scan.information -= cross.transpose() * weights;
-  const Eigen::MatrixXd efficient = all.slope - held.slope * weights;
+  Derivatives efficient{all.slope - held.slope * weights, all.change - held.change * weights};
   scan.by_trial = Eigen::MatrixXd::Zero(static_cast<Eigen::Index>(model.trials()), all.slope.cols());
   for (Eigen::Index k = 0; k < events; ++k)
-    scan.by_trial.row(static_cast<Eigen::Index>(model.events()[static_cast<std::size_t>(k)].trial)) += efficient.row(k);
+    scan.by_trial.row(static_cast<Eigen::Index>(model.events()[static_cast<std::size_t>(k)].trial)) +=
+        efficient.slope.row(k);
   scan.by_prior = Eigen::MatrixXd(0, all.slope.cols());
   if (const Eigen::VectorXd scatter = prior_scatter(model, fit); scatter.size() == weights.rows())
     scan.by_prior = scatter.asDiagonal() * weights;
@@ -240,6 +242,27 @@ void project(const TransitionModel& model, const Fit& fit, const Derivatives& al
       model.trials() >= Rules::enough_trials && model.events().size() >= Rules::enough_transitions * model.trials();
   // At the fit the nuisances' scores balance their prior's: the plain sum of the slopes is efficient already.
   scan.scores = all.slope.colwise().sum();
+  return efficient;
+}
+
+// Returns what the best variant of an effect promises in each phase: its gain, in the shares of the information there.
+PhaseGain gain_by_phase(const TransitionModel& model, const Fit& fit, const Derivatives& efficient,
+                        const ScannedEffect& effect) {
+  const Eigen::VectorXd& start = effect.start[effect.best];
+  const Eigen::Index first = effect.first[effect.best];
+  const Eigen::VectorXd slope = efficient.slope.middleCols(first, start.size()) * start;
+  const Eigen::VectorXd change = efficient.change.middleCols(first, start.size()) * start;
+  PhaseGain gain;
+  for (std::size_t i = 0; i < model.events().size(); ++i) {
+    const auto row = static_cast<Eigen::Index>(i);
+    gain.of(model.events()[i]) +=
+        std::pow(change[row], 2) + std::pow(slope[row] + fit.evaluation.score[i] * change[row], 2);
+  }
+  const double whole = gain.collisions + gain.stances;
+  if (!(whole > 0)) return {};
+  gain.collisions *= effect.gain[effect.best] / whole;
+  gain.stances *= effect.gain[effect.best] / whole;
+  return gain;
 }
 
 }  // namespace
@@ -261,7 +284,7 @@ EffectScan scan_effects(const TransitionModel& model, const Fit& fit, const std:
   Derivatives all{Eigen::MatrixXd::Zero(events, columns), Eigen::MatrixXd::Zero(events, columns)};
   const std::vector<ScannedColumn> alone = fill_by_responses(model, fit, list_columns(scanned), beside, threads, all);
   markov::parallel_for(alone.size(), threads, [&](std::size_t i) { differentiate(model, fit, alone[i], beside, all); });
-  project(model, fit, all, scan);
+  const Derivatives efficient = project(model, fit, all, scan);
   for (ScannedEffect& effect : scan.effects) {
     const auto count = static_cast<Eigen::Index>(effect.candidate->parameters.size());
     for (const Eigen::Index first : effect.first) {
@@ -271,6 +294,7 @@ EffectScan scan_effects(const TransitionModel& model, const Fit& fit, const std:
       effect.start.push_back(start);
     }
     effect.best = falling_order(effect.gain).front();
+    effect.by_phase = gain_by_phase(model, fit, efficient, effect);
     effect.columns = {all.slope.middleCols(effect.first[effect.best], count),
                       all.change.middleCols(effect.first[effect.best], count),
                       std::vector<double>(effect.candidate->parameters.size())};

@@ -10,6 +10,12 @@
 
 namespace metastable::analysis {
 
+/// The gain, 2 Delta log likelihood of one fit over another, in stances and in everything else.
+struct PhaseGain {
+  double collisions = 0, stances = 0;
+  double& of(const Event& event) { return event.kind == EventKind::stance ? stances : collisions; }
+};
+
 /// Holds what the scores at a fit say of one candidate.
 struct ScannedEffect {
   const Candidate* candidate = nullptr;
@@ -17,6 +23,7 @@ struct ScannedEffect {
   std::vector<Eigen::VectorXd> start;  ///< by variant: the values they point to
   std::vector<Eigen::Index> first;     ///< by variant: first of its columns
   std::size_t best = 0;                ///< variant
+  PhaseGain by_phase = {};             ///< of the best variant's gain
   Derivatives columns = {};            ///< those of the best variant, at neutral values
 };
 

@@ -21,6 +21,7 @@ constexpr double near_top = 4;              // evidence below the best, of a pai
 constexpr double worth_a_round = 4;  // evidence that swaps gained, for another round of them: alike effects gain less
 constexpr int most_swaps = 3;        // rounds of effects put in the place of others
 constexpr std::size_t most_extended = 3;  // pairs
+constexpr int times_longer = 4;           // is the fit of a leading set that did not converge
 
 constexpr double hardly_more = 9;  // by a set beyond one of its parts: less, and the part bounds it in any case
 
@@ -51,6 +52,13 @@ const RankedCause* best_of(const std::vector<RankedCause>& all) {
 auto find_set(const std::vector<RankedCause>& all, const std::vector<EffectTerm>& terms) {
   return std::ranges::find_if(
       all, [&](const RankedCause& one) { return one.terms.size() == terms.size() && extends(one.terms, terms); });
+}
+
+// Weighs what the scores promise that one more effect will have earned.
+double promised_evidence(const RankingProblem& problem, const SingleEffects& singles, const RankedCause& base,
+                         const ScannedEffect& more) {
+  const Fit& exact = exact_part(singles.causes, base.terms, problem.recalibrated);
+  return evidence_of(more, promised_to_earn(problem.model, more, base.fit, exact, problem.rules), problem.rules);
 }
 
 // Weighs what the last effect of a set earned. Its variants count as they did alone.
@@ -116,10 +124,10 @@ std::vector<RankedCause> strongest_of(const std::vector<RankedCause>& all, std::
 // @param best  evidence of the best  @param larger  gets the sets that it does not hold
 void extend(const RankingProblem& problem, const SingleEffects& singles, const RankedCause& base, double best,
             std::vector<RankedCause>& larger) {
-  std::vector<ScannedEffect> worth = promising_beside(problem, scan_beside(problem, singles, base), base);
+  std::vector<ScannedEffect> worth = promising_beside(problem, singles, scan_beside(problem, singles, base), base);
   const double needed = best - base.evidence - log_prior_of_one_more(problem, base.terms.size() + 1) - near_top;
   std::erase_if(worth, [&](const ScannedEffect& effect) {
-    if (base.evidence < best && evidence_of(effect, effect.gain[effect.best], problem.rules) < needed) return true;
+    if (base.evidence < best && promised_evidence(problem, singles, base, effect) < needed) return true;
     std::vector<EffectTerm> terms = base.terms;
     terms.push_back(term_at(effect, effect.best));
     return find_set(larger, terms) != larger.end();
@@ -137,7 +145,7 @@ void extend(const RankingProblem& problem, const SingleEffects& singles, const R
 std::vector<RankedCause> fit_alike_beside(const RankingProblem& problem, const SingleEffects& singles,
                                           const RankedCause& base, const std::vector<RankedCause>& known) {
   const EffectScan scan = scan_beside(problem, singles, base);
-  std::vector<const ScannedEffect*> tries = about_as_promising(problem, scan);
+  std::vector<const ScannedEffect*> tries = about_as_promising(problem, singles, scan, base);
   std::erase_if(tries, [&](const ScannedEffect* effect) {
     std::vector<EffectTerm> terms = base.terms;
     terms.push_back(term_at(*effect, effect->best));
@@ -181,24 +189,25 @@ double log_prior_of_one_more(const RankingProblem& problem, std::size_t size) {
   return std::log(problem.rules.pair_prior / std::max(1.0, others / k));
 }
 
-std::vector<const ScannedEffect*> about_as_promising(const RankingProblem& problem, const EffectScan& scan) {
+std::vector<const ScannedEffect*> about_as_promising(const RankingProblem& problem, const SingleEffects& singles,
+                                                     const EffectScan& scan, const RankedCause& base) {
   std::vector<double> promised;
   for (const ScannedEffect& effect : scan.effects)
-    promised.push_back(evidence_of(effect, effect.gain[effect.best], problem.rules));
+    promised.push_back(promised_evidence(problem, singles, base, effect));
   std::vector<const ScannedEffect*> all;
   for (std::size_t k = 0; k < promised.size(); ++k)
     if (promised[k] > std::ranges::max(promised) - alike_margin) all.push_back(&scan.effects[k]);
   return all;
 }
 
-std::vector<ScannedEffect> promising_beside(const RankingProblem& problem, const EffectScan& scan,
-                                            const RankedCause& base) {
+std::vector<ScannedEffect> promising_beside(const RankingProblem& problem, const SingleEffects& singles,
+                                            const EffectScan& scan, const RankedCause& base) {
   std::vector<ScannedEffect> worth;
   std::vector<double> promises;
   std::vector<const ScannedEffect*> promising;
   const double prior = log_prior_of_one_more(problem, base.terms.size() + 1);
   for (const ScannedEffect& effect : scan.effects) {
-    const double promised = evidence_of(effect, effect.gain[effect.best], problem.rules);
+    const double promised = promised_evidence(problem, singles, base, effect);
     std::vector<EffectTerm> terms = base.terms;
     terms.push_back(term_at(effect, effect.best));
     if (knows_start(problem.model, terms))
@@ -249,6 +258,22 @@ RankedCause with_one_more(const RankingProblem& problem, const SingleEffects& si
   return set;
 }
 
+void finish_leading(const RankingProblem& problem, std::vector<RankedCause>& sets) {
+  const RankedCause* best = best_of(sets);
+  const double least = best ? best->evidence - alike_margin : 0;
+  markov::parallel_for(sets.size(), problem.threads, [&](std::size_t k) {
+    RankedCause& set = sets[k];
+    if (!set.fitted() || set.fit.converged || !(set.evidence >= least)) return;
+    problem.heartbeat();
+    Fit longer =
+        fit(problem.model, set.fit.nuisance, set.terms,
+            {.count = {}, .refit_nuisances = true, .most_iterations = times_longer * problem.effort.most_iterations});
+    if (!(longer.penalised > set.fit.penalised)) return;
+    set.not_decided = longer.converged ? "" : longer.reason;
+    set.take(std::move(longer), problem.recalibrated);
+  });
+}
+
 std::vector<RankedCause> rank_larger_sets(const RankingProblem& problem, const SingleEffects& singles,
                                           std::vector<RankedCause>& pairs) {
   std::vector<RankedCause> sets;
@@ -264,6 +289,7 @@ std::vector<RankedCause> rank_larger_sets(const RankingProblem& problem, const S
       extend(problem, singles, base, std::max(before, singles.top), larger);
     }
     bound_by_parts(problem, singles, bases.front().terms.size() == 2 ? pairs : sets, larger);
+    finish_leading(problem, larger);
     bases = strongest_of(larger, 1, problem.rules);
     std::ranges::move(larger, std::back_inserter(sets));
     if (bases.empty() || bases.front().evidence < before) break;

@@ -13,18 +13,23 @@ namespace metastable::analysis {
 /// time.
 inline constexpr double alike_margin = 4;
 
-/// Lists the effects of a scan that promise about as much as the best one of it, to alike_margin.
-std::vector<const ScannedEffect*> about_as_promising(const RankingProblem& problem, const EffectScan& scan);
+/// Lists the effects of a scan beside a hypothesis that promise to earn about as much as the best one of it, to
+/// alike_margin.
+std::vector<const ScannedEffect*> about_as_promising(const RankingProblem& problem, const SingleEffects& singles,
+                                                     const EffectScan& scan, const RankedCause& base);
 
 /// Returns the log prior odds of a set of effects to the same without its last one, any of the others in its place.
 /// @param size  effects of the set, >= 2
 double log_prior_of_one_more(const RankingProblem& problem, std::size_t size);
 
-/// Lists what promises most beside a hypothesis. Where the model knows better starts than the scores, the scores do not
-/// decide.
+/// Lists what promises to earn most beside a hypothesis. Where the model knows better starts than the scores, the
+/// scores do not decide.
 /// @param scan  beside it
-std::vector<ScannedEffect> promising_beside(const RankingProblem& problem, const EffectScan& scan,
-                                            const RankedCause& base);
+std::vector<ScannedEffect> promising_beside(const RankingProblem& problem, const SingleEffects& singles,
+                                            const EffectScan& scan, const RankedCause& base);
+
+/// Takes the fits of the best sets, to alike_margin, to their ends where they did not converge.
+void finish_leading(const RankingProblem& problem, std::vector<RankedCause>& sets);
 
 /// Fits one more effect beside a hypothesis, and weighs the two together by what the last one earns.
 RankedCause with_one_more(const RankingProblem& problem, const SingleEffects& singles, const RankedCause& base,

@@ -163,6 +163,28 @@ void decide_unconverged(SingleEffects& singles) {
       cause.not_decided.clear();
 }
 
+// An effect gains as much as one with more parameters does, but for what that one earns beyond its error of form:
+// lengths of all legs follow an eccentric hub closer than the catalogue's form of it does.
+void forgive_form(const RankingProblem& problem, SingleEffects& singles) {
+  const auto parameters = [](const RankedCause& cause) { return cause.terms[0].candidate->parameters.size(); };
+  const auto comparable = [&](const RankedCause& cause) {
+    return cause.fitted() && std::isfinite(cause.evidence) && parameters(cause) > 0;
+  };
+  for (RankedCause& cause : singles.causes) {
+    if (!comparable(cause)) continue;
+    const Fit& exact = exact_part(singles.causes, cause.terms, problem.recalibrated);
+    double forgiven = 0;
+    for (const RankedCause& larger : singles.causes)
+      if (comparable(larger) && parameters(larger) > parameters(cause) && larger.gain > cause.gain)
+        forgiven = std::max(
+            forgiven, larger.gain - cause.gain - earned(problem.model, larger.fit, cause.fit, exact, problem.rules));
+    const auto count = static_cast<double>(parameters(cause));
+    cause.evidence += evidence_of_gain(cause.gain + forgiven, count, problem.rules) -
+                      evidence_of_gain(cause.gain, count, problem.rules);
+  }
+  singles.update_top();
+}
+
 // Lists the strongest fitted effects for which `wanted` holds, by falling evidence.
 template <class Wanted>
 std::vector<std::size_t> strongest(const RankingProblem& problem, const SingleEffects& singles, Wanted wanted) {
@@ -247,6 +269,7 @@ SingleEffects rank_single_effects(const RankingProblem& problem, const RankingOp
   refine_leaders(problem, singles);
   refit_unconverged(problem, singles);
   decide_unconverged(singles);
+  forgive_form(problem, singles);
   return singles;
 }
 
