@@ -8,9 +8,11 @@
 namespace metastable::analysis {
 
 /// Evidence is the likelihood ratio averaged over an effect's variants and over a normal prior on its p parameters
-/// whose expected gain is Rules::expected_gain (so that effects of one and of eight parameters start level), by
-/// Laplace's approximation: log mean_v exp(gain_v g/(1+g)/2) - p/2 log(1+g), g = expected_gain / p. Where an effect has
-/// a prior of its own (FreeParameter::prior_sd) its gain has paid for that besides.
+/// whose expected gain is Rules::expected_gain (so that effects of one and of eight parameters start level), or the one
+/// above it that makes the evidence largest (so that no share of a large gain is lost; the local empirical Bayes of
+/// Liang et al., J. Am. Stat. Assoc. 103, 410, 2008, eq. 9), by Laplace's approximation: log mean_v exp(gain_v
+/// g/(1+g)/2) - p/2 log(1+g), g = max(expected_gain, gain - p) / p. Where an effect has a prior of its own
+/// (FreeParameter::prior_sd) its gain has paid for that besides.
 /// @param gain  2 Delta penalised log likelihood; that of the best variant is fitted, the others' follow their scores
 double evidence_of(const ScannedEffect& scanned, double gain, const Rules& rules);
 

@@ -93,33 +93,51 @@ void fit_pairs(const RankingProblem& problem, const SingleEffects& singles, cons
   }
 }
 
-// A pair may gain beyond its first effect because its fit came upon a better optimum of that effect.
-void refit_from_pairs(const RankingProblem& problem, EffectPairs& ranked, ScansBeside& beside) {
-  SingleEffects& singles = ranked.singles;
-  std::vector<const RankedCause*> candidates;
+// An effect as a pair has it, from where it is fitted alone.
+struct OtherWay {
+  const RankedCause* pair;
+  std::size_t term;
+};
+
+// Lists the effects that may have a better optimum alone where a pair has them: of pairs that gain beyond their first
+// effect this one, and of pairs that gain much more together than alone the second one, too.
+std::vector<OtherWay> other_ways(const RankingProblem& problem, const EffectPairs& ranked) {
   std::vector<double> gains;
-  for (const RankedCause& pair : ranked.pairs) {
-    const RankedCause& first = singles.causes[problem.index_of(pair.terms[0].candidate)];
-    if (std::isfinite(pair.evidence) && !pair.terms[0].candidate->parameters.empty() &&
-        pair.gain > first.gain + gained_beside &&
-        problem.model.evaluate(pair.fit.nuisance, std::vector{pair.terms[0]}).total() >
-            first.fit.log_likelihood - lost_alone) {
-      candidates.push_back(&pair);
-      gains.push_back(pair.gain);
+  for (const RankedCause& pair : ranked.pairs) gains.push_back(std::isfinite(pair.evidence) ? pair.gain : -1);
+  std::vector<OtherWay> ways;
+  for (const std::size_t term : {0, 1}) {
+    std::size_t found = 0;
+    for (const std::size_t k : falling_order(gains)) {
+      const RankedCause& pair = ranked.pairs[k];
+      const RankedCause& single = ranked.singles.causes[problem.index_of(pair.terms[term].candidate)];
+      if (found == most_other_ways || gains[k] < 0) break;
+      if (pair.terms[term].candidate->parameters.empty() || pair.gain <= single.gain + gained_beside ||
+          (term == 1 && pair.together <= problem.rules.most_together))
+        continue;
+      const Fit& alone = single.fitted() ? single.fit : problem.recalibrated;
+      if (problem.model.evaluate(pair.fit.nuisance, std::vector{pair.terms[term]}).total() <=
+          alone.log_likelihood - lost_alone)
+        continue;
+      ways.push_back({&pair, term});
+      ++found;
     }
   }
-  std::vector<const RankedCause*> gaining;
-  for (const std::size_t k : falling_order(gains))
-    if (gaining.size() < most_other_ways) gaining.push_back(candidates[k]);
-  std::vector<Fit> again(gaining.size());
-  markov::parallel_for(gaining.size(), problem.threads, [&](std::size_t k) {
+  return ways;
+}
+
+// A pair may gain beyond its effects because its fit came upon a better optimum of one of them.
+void refit_from_pairs(const RankingProblem& problem, EffectPairs& ranked, ScansBeside& beside) {
+  SingleEffects& singles = ranked.singles;
+  const std::vector<OtherWay> ways = other_ways(problem, ranked);
+  std::vector<Fit> again(ways.size());
+  markov::parallel_for(ways.size(), problem.threads, [&](std::size_t k) {
     problem.heartbeat();
-    again[k] = fit(problem.model, gaining[k]->fit.nuisance, {gaining[k]->terms[0]},
+    again[k] = fit(problem.model, ways[k].pair->fit.nuisance, {ways[k].pair->terms[ways[k].term]},
                    {.count = {}, .refit_nuisances = true, .most_iterations = problem.effort.most_iterations});
   });
   bool any = false;
   for (std::size_t k = 0; k < again.size(); ++k) {
-    const std::size_t i = problem.index_of(gaining[k]->terms[0].candidate);
+    const std::size_t i = problem.index_of(ways[k].pair->terms[ways[k].term].candidate);
     if (!(problem.gain(again[k]) > singles.causes[i].gain + 1)) continue;
     singles.take(problem, i, std::move(again[k]));
     beside.forget(i);

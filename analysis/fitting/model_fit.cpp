@@ -27,6 +27,7 @@ constexpr int most_halvings = 7, few_halvings = 3;  // of a step; of one that is
 constexpr double much_more = 1.25, longest = 8;
 constexpr int rough_steps = 2;             // A fit that is only looked at takes so many steps by another one's slopes.
 constexpr double difference_share = 0.05;  // step of a difference, of what the data resolve
+constexpr double widening = 8;             // times as long are steps across kinks of single events' densities
 
 // Holds all parameters of a hypothesis in one vector.
 class Point {
@@ -74,7 +75,10 @@ class Point {
   std::vector<Slot> slots_;
 };
 
-Derivatives differences(Point& point, const Evaluation& here, bool both_sides = false) {
+// How slopes are differenced: to one side, to both, or to both and further off.
+enum class Reach { one_side, both_sides, wide };
+
+Derivatives differences(Point& point, const Evaluation& here, Reach reach = Reach::one_side) {
   const auto events = static_cast<Eigen::Index>(here.score.size());
   auto& slots = point.slots();
   Derivatives d{Eigen::MatrixXd(events, static_cast<Eigen::Index>(slots.size())),
@@ -87,12 +91,13 @@ Derivatives differences(Point& point, const Evaluation& here, bool both_sides = 
       *slots[p].value = value;
       return moved;
     };
-    const bool above = value + slots[p].step <= slots[p].upper, below = value - slots[p].step >= slots[p].lower;
-    double step = above ? slots[p].step : -slots[p].step;
+    double step = slots[p].step * (reach == Reach::wide ? widening : 1);
+    const bool above = value + step <= slots[p].upper, below = value - step >= slots[p].lower;
+    if (!above) step = -step;
     const Evaluation moved = moved_to(value + step);
     d.steps[p] = step;
     Evaluation other;
-    if (both_sides && above && below) {
+    if (reach != Reach::one_side && above && below) {
       other = moved_to(value - step);
       step *= 2;
       d.steps[p] = 0;
@@ -221,13 +226,13 @@ class Climb {
 
   // Moves all parameters together; where that fails, the effects' and the nuisances' by themselves, and all of them
   // by steps that are damped more. @param resolved  a promise below it is not resolved
-  Stride stride(const FreeParts& parts, double resolved, bool both_sides) {
+  Stride stride(const FreeParts& parts, double resolved, Reach reach) {
     const double before = best_;
     Stride stride;
     step_of(parts.all, 0, stride);
     stride.promised = stride.foretold;
     stride.better = !(stride.promised > worth_a_step) || rises(parts.all, level_, most_halvings, before, stride);
-    const bool at_the_top = both_sides && stride.promised < resolved;
+    const bool at_the_top = reach != Reach::one_side && stride.promised < resolved;
     if (!stride.better && !at_the_top)
       stride.better = rises(parts.of_terms, 0, most_halvings, before, stride) ||
                       rises(parts.of_nuisances, 0, most_halvings, before, stride);
@@ -361,13 +366,13 @@ Fit fit(const TransitionModel& model, const std::vector<double>& nuisance, const
   Climb climb(point, weights, result);
   const double start = climb.best();
   const bool finite = std::isfinite(start);
-  bool both_sides = false;  // are differenced: at a kink of some event's density one side promises what is not there
+  Reach reach = Reach::one_side;  // at a kink of some event's density one side promises what is not there
   result.converged = point.slots().empty() && finite;
   if (!finite) result.reason = "its likelihood is not finite";
-  for (int iteration = 0; finite && iteration < options.most_iterations + both_sides && !point.slots().empty();
-       ++iteration) {
-    result.derivatives = iteration == 0 && options.derivatives ? *options.derivatives
-                                                               : differences(point, result.evaluation, both_sides);
+  for (int iteration = 0;
+       finite && iteration < options.most_iterations + static_cast<int>(reach) && !point.slots().empty(); ++iteration) {
+    result.derivatives =
+        iteration == 0 && options.derivatives ? *options.derivatives : differences(point, result.evaluation, reach);
     result.information = information(result.derivatives, result.evaluation, weights);
     result.gradient = penalised_gradient(point.slots(), weights, result);
     const FreeParts parts = free_parts(point.slots(), result.gradient, result.information);
@@ -377,15 +382,15 @@ Fit fit(const TransitionModel& model, const std::vector<double>& nuisance, const
     }
     // What is promised below this differences do not resolve.
     const double resolved = unresolved + unresolved_share * (climb.best() - start);
-    const Stride stride = climb.stride(parts, resolved, both_sides);
+    const Stride stride = climb.stride(parts, resolved, reach);
     result.promised = stride.promised;
     if (options.ends_as_foretold && stride.better && stride.foretold < small_rise &&
         std::abs(stride.risen - stride.foretold) < as_foretold * stride.foretold) {
       result.converged = true;
       break;
     }
-    if (!stride.better && stride.promised >= resolved && !both_sides) {
-      both_sides = true;
+    if (!stride.better && stride.promised >= resolved && reach != Reach::wide) {
+      reach = reach == Reach::one_side ? Reach::both_sides : Reach::wide;
       continue;
     }
     climb.damp_next(stride);

@@ -62,7 +62,8 @@ struct FitOptions {
 /// Finds the maximum of the penalised likelihood by Gauss-Newton steps on the scores: with z the normal score and J =
 /// dz/d(speed), log density = log phi(z) + log J, and the information is the sum of z' z'^T + (log J)' (log J)'^T,
 /// which no outlying observation inflates; damped where they gain far less than promised. Slopes are differences to one
-/// side, from where no step rises on to both. Starts from the given values; parameters stay inside their bounds. A
+/// side, from where no step rises on to both, and where none rises by these over wider steps, which see past the kinks
+/// of single events' densities. Starts from the given values; parameters stay inside their bounds. A
 /// likelihood that is not finite there has not converged, with that reason.
 Fit fit(const TransitionModel& model, const std::vector<double>& nuisance, const std::vector<EffectTerm>& terms,
         const FitOptions& options = {});

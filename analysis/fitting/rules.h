@@ -16,8 +16,9 @@ namespace metastable::analysis {
 struct Rules {
   // Evidence of a hypothesis.
 
-  /// Gain expected of an effect before its size is known. Convention: six standard errors, between what is hardly seen
-  /// (16) and what nobody overlooks (64). Half or twice of it move the evidence of a gain of 100 by less than 1.
+  /// Gain expected of an effect before its size is known, at least. Convention: six standard errors, between what is
+  /// hardly seen (16) and what nobody overlooks (64). Half or twice of it move the evidence of a gain of 100 by less
+  /// than 1.
   double expected_gain = 36;
   /// Share of an effect's size that its form may be off by: no catalogue entry has exactly the form of what nature did.
   /// Measurement: effects of engines under the form of the catalogue leave up to 5 % of their size (page of results,

@@ -260,6 +260,8 @@ class Learner {
     for (std::size_t p = 0; p < phases_; ++p) choose(p, visits.phases[p], edges[p]);
     for (std::size_t p = 0; p < phases_; ++p) land(p);
     follow_chain();
+    if (std::ranges::all_of(chance_, [](const auto& at_phase) { return std::ranges::max(at_phase) <= 0; }))
+      return std::move(answer_);
     take_logarithms();
     if (map_.dimension > most_mesh_dimensions) fit();
     answer_.level = [learnt = learnt_, d = d_](int phase, auto from, auto levels) {
@@ -332,9 +334,10 @@ class Learner {
   void follow_chain() {
     for (std::size_t p = 0; p < phases_; ++p) chance_[p].assign(learnt_->anchors[p].size(), 0);
     const int window = (options_.window + map_.phases - 1) / map_.phases;
-    bool reached = false;  // failure, from every anchor
+    // An anchor may land at none but itself: the window is long enough once failure is reached from no more of them.
+    std::ptrdiff_t reached = 0, before = -1;  // anchors from which failure is
     int taken = 0;
-    for (; taken < window || (!reached && taken < longest_window * window); ++taken) {
+    for (; taken < window || (reached > before && taken < longest_window * window); ++taken) {
       for (std::size_t p = phases_; p-- > 0;) {
         const std::vector<double>& after = chance_[(p + 1) % phases_];
         std::vector<double> now = rows_[p].fail;
@@ -347,8 +350,9 @@ class Learner {
         for (double& one : now) one = std::min(one, 1.0);
         chance_[p] = std::move(now);
       }
-      reached =
-          std::ranges::all_of(chance_, [](const auto& at_phase) { return *std::ranges::min_element(at_phase) > 0; });
+      before = std::exchange(reached, 0);
+      for (const std::vector<double>& at_phase : chance_)
+        reached += std::ranges::count_if(at_phase, [](double one) { return one > 0; });
     }
     answer_.window = taken * map_.phases;
   }

@@ -42,8 +42,8 @@ struct LearningOptions {
 
 /// Holds the chance of failing within a window at anchors, and interpolates its logarithm between the nearest of them.
 struct LearntLevel {
-  LevelFunction level;
-  int window = 0;           ///< [steps], long enough for a failure from every anchor, if 20 times what was asked is
+  LevelFunction level;  ///< empty where failure is not reached from any anchor
+  int window = 0;  ///< [steps], so long that in a longer one no more anchors would fail, 20 times that asked at most
   std::uint64_t calls = 0;  ///< rows that the map was asked for
 };
 

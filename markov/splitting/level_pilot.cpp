@@ -44,7 +44,7 @@ class Pilot {
     std::uint64_t failed = 0;
     auto steps = std::max(window, revolutions(shortest_spread));
     std::size_t bins = 0;
-    do {
+    const auto push = [&] {
       if (calls() - calls_before > options_.most_calls)
         throw std::runtime_error(fmt::format(
             "splitting: {} in {} steps of the map, pushed as far from the middle as they go: no number is "
@@ -56,20 +56,29 @@ class Pilot {
       if (now <= bins) steps += revolutions(static_cast<double>(steps) / 2);
       bins = now;
       spread(steps);
-      if (ensemble_.all_failed()) return finish(true);
       failed = ensemble_.failures() - failed_before;
-    } while (failed < enough_failures);
-    for (int k = 0; k < refinements; ++k) {
+      return !ensemble_.all_failed();
+    };
+    do
+      if (!push()) return finish(true);
+    while (failed < enough_failures);
+    std::uint64_t lesson = 0;
+    for (int k = 0; k < refinements;) {
       if (!options_.level) {
         LearntLevel learnt = learn_level(map_, frames_, visits_, levels.edges,
                                          {.anchors = options_.replicas,
                                           .window = static_cast<int>(window),
                                           .seed = options_.seed,
-                                          .stream = options_.stream + 100 * static_cast<std::uint64_t>(k)});
+                                          .stream = options_.stream + 100 * lesson++});
         more_calls_ += learnt.calls;
+        if (!learnt.level) {  // Replicas have failed, but those that are visited now are too far from it to learn from.
+          if (!push()) return finish(true);
+          continue;
+        }
         pilot_.window = static_cast<std::uint64_t>(learnt.window);
         levels.level = std::move(learnt.level);
       }
+      ++k;
       split(levels);
       spread(std::max(2 * pilot_.window, revolutions(shortest_spread)));
       if (ensemble_.all_failed()) return finish(true);

@@ -160,17 +160,16 @@ TEST(Diagnosis, TriesThePairsAskedFor) {
   EXPECT_THROW(diagnose(*experiment, options), std::invalid_argument);
 }
 
-Experiment with_outside_effect(const std::string& id, double size) {
+Experiment in_laboratory(const LaboratoryOptions& reality) {
   auto conditions = stand_in_conditions(stand_in_setting());
-  const dynamics::LaboratorySetup setup =
-      laboratory_setup(conditions, {.outside = {{id, size}}, .sensor_noise = 0.008, .seed = 31});
+  const dynamics::LaboratorySetup setup = laboratory_setup(conditions, reality);
   const ExperimentFiles files = laboratory_files(conditions, setup, run_laboratory(setup, 0), {}).files;
   return parse_experiment({"lab", files.experiment_toml, files.collisions_csv, files.trials_csv, {}});
 }
 
 // Noise of the contact grows with speed here: two effects on its mean that cancel one another take its shape.
 TEST(Diagnosis, APairThatGainsOnlyTogetherDoesNotExplain) {
-  const Experiment experiment = with_outside_effect("speed_spread", 0.45);
+  const Experiment experiment = in_laboratory({.outside = {{"speed_spread", 0.45}}, .sensor_noise = 0.008, .seed = 31});
   DiagnosisOptions options = quick();
   options.catalogue = {"speed_dependent_restitution", "speed_dependent_friction", "leg_contact"};
   const Diagnosis d = diagnose(*wheel_transitions(experiment), options);
@@ -185,7 +184,7 @@ TEST(Diagnosis, APairThatGainsOnlyTogetherDoesNotExplain) {
 
 // Friction rises and falls over the trials, as no effect does: of all that it may vary by, the swing has most evidence.
 TEST(Diagnosis, WhatVariesWithoutANameSaysByWhat) {
-  const Experiment experiment = with_outside_effect("daily_cycle", 0.03);
+  const Experiment experiment = in_laboratory({.outside = {{"daily_cycle", 0.03}}, .sensor_noise = 0.008, .seed = 31});
   DiagnosisOptions options = quick();
   options.catalogue = {"trial_spread", "trial_drift", "leg_contact"};
   const Diagnosis d = decided(*wheel_transitions(experiment), options);
@@ -255,6 +254,45 @@ class TwoOptima : public test::Line {
 
 // What an effect gains by another optimum of the nuisances is not its own. (Two free runs of a drum differed by a
 // sensor's bias for it.)
+// Where speeds are exact to their digits gains are of millions. Lengths of eight legs close all of the gap, noise
+// beside them next to all.
+TEST(Diagnosis, NamesLegsWhereSpeedsAreExact) {
+  const std::vector<double> lengths{0.1520, 0.1521, 0.1521, 0.1510, 0.1517, 0.1507, 0.1526, 0.1529};
+  const Experiment experiment = in_laboratory({.effects = {{"leg_lengths", lengths}}, .seed = 7});
+  DiagnosisOptions options = quick();
+  options.catalogue = {"leg_lengths", "sensor_noise", "hub_eccentricity", "leg_contact"};
+  const Diagnosis d = decided(*wheel_transitions(experiment), options);
+  EXPECT_EQ(d.verdict, Verdict::explained);
+  EXPECT_EQ(d.causes.set, std::vector<std::string>{"leg_lengths"});
+}
+
+// An eccentric hub acts much like other legs, which have more parameters to follow it with. Beside a drag the pair is
+// named, and no leg.
+TEST(Diagnosis, NamesADragBesideAnEccentricHub) {
+  const Experiment experiment = in_laboratory(
+      {.effects = {{"air_drag", {0.0012}}, {"hub_eccentricity", {0.002, 1.5}}}, .sensor_noise = 0.008, .seed = 9});
+  DiagnosisOptions options = quick();
+  options.catalogue = {"leg_lengths", "sensor_noise", "hub_eccentricity", "air_drag", "slope_offset", "leg_contact"};
+  const Diagnosis d = decided(*wheel_transitions(experiment), options);
+  EXPECT_EQ(d.verdict, Verdict::explained);
+  EXPECT_EQ(d.causes.set, std::vector<std::string>{"air_drag+hub_eccentricity"});
+}
+
+// The end of a sag lies between those that are listed, and its size hangs on it.
+TEST(Diagnosis, FindsWhereASagEnds) {
+  const Experiment experiment =
+      in_laboratory({.effects = {{"slope_profile", {-0.0055, 0, 1.83}}}, .sensor_noise = 0.008, .seed = 7});
+  DiagnosisOptions options = quick();
+  options.catalogue = {"slope_profile", "leg_lengths", "air_drag", "sensor_noise"};
+  const Diagnosis d = decided(*wheel_transitions(experiment), options);
+  EXPECT_EQ(d.verdict, Verdict::explained);
+  ASSERT_EQ(d.causes.set, std::vector<std::string>{"slope_profile"});
+  const auto& found = d.causes.ranked[0].parameters[0];
+  ASSERT_EQ(found[2].name, "to_m");
+  EXPECT_NEAR(found[0].value, -0.0055, 0.0001);
+  EXPECT_NEAR(found[2].value, 1.83, 0.02);
+}
+
 TEST(Diagnosis, AnEffectGainsNothingByAnotherOptimum) {
   const test::Line straight = test::line(0.8, 5);
   const Evaluation here = straight.evaluate(std::vector<double>{0, 0}, {});

@@ -5,6 +5,7 @@
 #include <cmath>
 #include <vector>
 
+#include "analysis/fitting/bayes_factor.h"
 #include "tests/analysis/line.h"
 
 namespace metastable::analysis {
@@ -69,6 +70,61 @@ TEST(EffectFit, TriesTheOtherKindOfALargeEffectWhateverItsScorePromises) {
   const Fit found = fit_one_more(model, {}, nothing, scanned);
   EXPECT_EQ(found.terms.back().variant, (std::vector<double>{1, 1}));
   EXPECT_NEAR(found.terms.back().values[0], 1, 0.1);
+}
+
+// A wave whose frequency is 1.3417, where 1.3 is listed.
+class Tuned : public test::Line {
+ public:
+  explicit Tuned(const Line& from) : Line(from) {
+    candidates_[0].id = "wave";
+    candidates_[0].variants = {{1.3}};
+    candidates_[0].refine = {0.2};
+    for (std::size_t i = 0; i < y_.size(); ++i) y_[i] += 50 * wave(i, 1.3417);
+  }
+  Evaluation evaluate(std::span<const double> n, std::span<const EffectTerm> terms) const override {
+    Evaluation e = Line::evaluate(n, {});
+    for (std::size_t i = 0; i < e.score.size(); ++i) {
+      for (const EffectTerm& t : terms) e.score[i] -= t.values[0] / std::exp(n[1]) * wave(i, t.variant[0]);
+      e.log_density[i] = -0.5 * e.score[i] * e.score[i] - 0.91893853320467274 - n[1];
+    }
+    return e;
+  }
+
+ private:
+  double wave(std::size_t i, double frequency) const {
+    return std::sin(frequency * 0.01 * static_cast<double>(i % 300));
+  }
+};
+
+// Moves that are halved three times come to within 0.0125 of it, where its gain is still far from the largest.
+TEST(EffectFit, RefinesAVariantUntilItMovesNoMore) {
+  const Tuned model(line(0, 5, 600));
+  const Candidate* candidate = &model.candidates()[0];
+  Fit found = fit(model, {0, 0}, {{candidate, {1.3}, {40.0}}});
+  const double before = found.penalised;
+  refine_variant(model, {}, found);
+  EXPECT_NEAR(found.terms.back().variant[0], 1.3417, 0.003);
+  EXPECT_NEAR(found.terms.back().values[0], 50, 0.5);
+  EXPECT_GT(found.penalised, before + 10);
+}
+
+// A gain is worth half of itself, less what its parameters cost, however large it is: a fixed expected gain took 18 %
+// of one by eight parameters.
+TEST(Evidence, OfALargeGainIsHalfOfIt) {
+  const Rules rules;
+  for (const double parameters : {1.0, 2.0, 8.0})
+    EXPECT_NEAR(evidence_of_gain(1e8, parameters, rules), 0.5e8 - 0.5 * parameters * (1 + std::log(1e8 / parameters)),
+                1e-3);
+  // Of what is expected, and less, it is the normal prior's.
+  EXPECT_NEAR(evidence_of_gain(20, 1, rules), 0.5 * 36.0 / 37 * 20 - 0.5 * std::log(37), 1e-12);
+  // It is the largest over all priors that expect as much as the rule says or more.
+  for (const double gain : {40.0, 200.0, 5000.0})
+    for (const double expected : {36.0, 60.0, 1000.0, 6000.0}) {
+      Rules fixed;
+      fixed.expected_gain = expected;
+      const double g = expected / 2;
+      EXPECT_GE(evidence_of_gain(gain, 2, rules) + 1e-9, 0.5 * g / (1 + g) * gain - std::log1p(g));
+    }
 }
 
 }  // namespace
