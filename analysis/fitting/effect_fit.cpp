@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <set>
 #include <utility>
 
 #include "analysis/statistics/falling_order.h"
@@ -16,6 +17,7 @@ constexpr double furthest_start = 0.25;  // share of a parameter's range
 constexpr double small_start = 0.1;      // share of a size worth starting from, where the scores' start was a bad one
 constexpr double worth_moving = 0.2;     // rise of the log likelihood
 constexpr int most_refinements = 10;     // of a variant, while it moves
+constexpr int most_kinds = 3;            // are refined one after the other
 
 // Says whether two variants are two kinds of one thing, as a leg's friction and its restitution: they differ in one
 // entry only, of which the list has no third value.
@@ -72,6 +74,78 @@ Fit fit_from_neutral(const TransitionModel& model, const Fit& base, const Scanne
   return fit(model, base.nuisance, terms, options);
 }
 
+// Moves the last term's variant between the list's values.
+class VariantSearch {
+ public:
+  VariantSearch(const TransitionModel& model, const Effort& effort, Fit& best)
+      : model_(model), effort_(effort), best_(best), candidate_(*best.terms.back().candidate) {}
+
+  // Moves entry by entry as long as the likelihood rises, by halved moves, and to the tops of parabolas between them.
+  bool halve_moves() {
+    bool moved = false, moving = true;
+    double share = 0.5;
+    for (int round = 0; round < effort_.refinements || (moving && round < most_refinements); ++round, share /= 2) {
+      moving = false;
+      for (std::size_t entry = 0; entry < candidate_.refine.size(); ++entry)
+        if (candidate_.refine[entry] != 0) moving = move(entry, share * candidate_.refine[entry]) || moving;
+      moved = moved || moving;
+    }
+    return moved;
+  }
+
+  // Moves all entries together with what is fitted.
+  bool move_together() { return take(fitted(best_.terms)); }
+
+  // Takes another kind, where an entry has values that are not refined, and moves that.
+  bool change_kind() {
+    bool changed = false;
+    for (std::size_t entry = 0; entry < candidate_.refine.size(); ++entry) {
+      if (candidate_.refine[entry] != 0) continue;
+      std::set<double> kinds;
+      for (const std::vector<double>& listed : candidate_.variants) kinds.insert(listed[entry]);
+      for (const double kind : kinds)
+        if (kind != best_.terms.back().variant[entry]) changed = take(fitted(terms_at(entry, kind))) || changed;
+    }
+    return changed;
+  }
+
+ private:
+  std::vector<EffectTerm> terms_at(std::size_t entry, double value) const {
+    std::vector<EffectTerm> terms = best_.terms;
+    terms.back().variant[entry] = value;
+    return terms;
+  }
+  Fit at(std::size_t entry, double value) const { return stepped(model_, best_, terms_at(entry, value)); }
+  Fit fitted(const std::vector<EffectTerm>& terms) const {
+    FitOptions options{.count = {}, .refit_nuisances = true, .most_iterations = effort_.most_iterations};
+    options.last_variant_too = true;
+    return fit(model_, best_.nuisance, terms, options);
+  }
+
+  bool take(Fit tried) {
+    if (!(tried.penalised > best_.penalised + worth_moving)) return false;
+    best_ = std::move(tried);
+    return true;
+  }
+
+  bool move(std::size_t entry, double step) {
+    const double here = best_.terms.back().variant[entry];
+    Fit tried = at(entry, here + step);
+    const double after = tried.penalised;
+    if (take(std::move(tried))) return true;
+    tried = at(entry, here - step);
+    const double before = tried.penalised;
+    if (take(std::move(tried))) return true;
+    const double bend = after - 2 * best_.penalised + before, slope = 0.5 * (after - before);
+    return bend < 0 && -0.5 * slope * slope / bend > worth_moving && take(at(entry, here - step * slope / bend));
+  }
+
+  const TransitionModel& model_;
+  const Effort& effort_;
+  Fit& best_;
+  const Candidate& candidate_;
+};
+
 }  // namespace
 
 Effort effort_for(const TransitionModel& model, const Fit& recalibrated) {
@@ -127,42 +201,16 @@ Fit fit_one_more(const TransitionModel& model, const Effort& effort, const Fit& 
 }
 
 void refine_variant(const TransitionModel& model, const Effort& effort, Fit& best) {
-  const Candidate& candidate = *best.terms.back().candidate;
-  bool moved = false, moving = true;
-  const auto move_to = [&](std::size_t entry, double value) {
-    std::vector<EffectTerm> terms = best.terms;
-    terms.back().variant[entry] = value;
-    Fit tried = stepped(model, best, terms);
-    const double penalised = tried.penalised;
-    if (penalised > best.penalised + worth_moving) {
-      best = std::move(tried);
-      moved = moving = true;
-    }
-    return penalised;
-  };
-  double share = 0.5;
-  for (int round = 0; round < effort.refinements || (moving && round < most_refinements); ++round, share /= 2) {
-    moving = false;
-    for (std::size_t entry = 0; entry < candidate.refine.size(); ++entry) {
-      const double here = best.terms.back().variant[entry], step = share * candidate.refine[entry];
-      if (step == 0) continue;
-      const double middle = best.penalised, after = move_to(entry, here + step);
-      if (best.penalised > middle) continue;
-      const double before = move_to(entry, here - step);
-      if (best.penalised > middle) continue;
-      // The top of the parabola through the three.
-      const double bend = after - 2 * middle + before, slope = 0.5 * (after - before);
-      if (bend < 0 && -0.5 * slope * slope / bend > worth_moving) move_to(entry, here - step * slope / bend);
-    }
+  VariantSearch search(model, effort, best);
+  bool moved = false, changed = true;
+  for (int pass = 0; changed && pass < most_kinds; ++pass) {
+    const bool halved = search.halve_moves(), together = search.move_together();
+    changed = search.change_kind();
+    moved = moved || halved || together || changed;
   }
-  if (!moved) return;
-  // Another kind may suit where the list has no such values.
-  for (std::size_t entry = 0; entry < candidate.refine.size(); ++entry)
-    if (candidate.refine[entry] == 0)
-      for (const std::vector<double>& listed : candidate.variants)
-        if (listed[entry] != best.terms.back().variant[entry]) move_to(entry, listed[entry]);
-  best = fit(model, best.nuisance, best.terms,
-             {.count = {}, .refit_nuisances = true, .most_iterations = effort.most_iterations});
+  if (moved)
+    best = fit(model, best.nuisance, best.terms,
+               {.count = {}, .refit_nuisances = true, .most_iterations = effort.most_iterations});
 }
 
 }  // namespace metastable::analysis

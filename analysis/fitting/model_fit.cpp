@@ -32,7 +32,8 @@ constexpr double widening = 8;             // times as long are steps across kin
 // Holds all parameters of a hypothesis in one vector.
 class Point {
  public:
-  Point(const TransitionModel& model, std::vector<double> nuisance, std::vector<EffectTerm> terms, bool with_nuisances)
+  Point(const TransitionModel& model, std::vector<double> nuisance, std::vector<EffectTerm> terms, bool with_nuisances,
+        bool last_variant_too = false)
       : model_(model), nuisance_(std::move(nuisance)), terms_(std::move(terms)) {
     if (with_nuisances)
       for (std::size_t i = 0; i < nuisance_.size(); ++i) {
@@ -46,6 +47,14 @@ class Point {
         prior.nominal = p.neutral;
         prior.prior_sd = p.prior_sd;
         slots_.push_back({&term.values[i], p.step, p.step, p.lower, p.upper, prior, false});
+      }
+    if (!last_variant_too) return;
+    EffectTerm& last = terms_.back();
+    for (std::size_t i = 0; i < last.candidate->refine.size(); ++i)
+      if (const double spacing = last.candidate->refine[i]; spacing > 0) {
+        double& entry = last.variant[i];
+        const double step = difference_share * spacing;
+        slots_.push_back({&entry, step, step, entry - spacing, entry + spacing, {}, false});
       }
   }
   Point(const Point&) = delete;
@@ -359,7 +368,7 @@ Fit stepped(const TransitionModel& model, const Fit& near, const std::vector<Eff
 
 Fit fit(const TransitionModel& model, const std::vector<double>& nuisance, const std::vector<EffectTerm>& terms,
         const FitOptions& options) {
-  Point point(model, nuisance, terms, options.refit_nuisances);
+  Point point(model, nuisance, terms, options.refit_nuisances, options.last_variant_too);
   const Eigen::VectorXd weights = event_weights(model, options.count);
   Fit result;
   result.evaluation = options.evaluation ? *options.evaluation : point.evaluate();

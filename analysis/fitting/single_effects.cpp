@@ -18,8 +18,9 @@ constexpr double promise_share = 0.2;     // of the largest promised gain, less
 constexpr double promise_margin = 40;     //   this much
 constexpr double overlooked_margin = 12;  // evidence by the scores below the best fitted one, for a fit after all
 constexpr double leader_evidence = 2;     // of an effect that is refined, and that pairs are built on
-constexpr double refined_share = 0.7;     // of the best evidence, less
-constexpr double refined_margin = 10;     //   this much, for an effect worth refining and another start
+constexpr double refined_share = 0.4;     // of the best evidence, less a margin, for an effect worth refining
+constexpr double restarted_share = 0.7;   // of the best evidence, less a margin, for another start of a fit
+constexpr double near_margin = 10;        // of either
 constexpr double refit_margin = 60;       // evidence below the best, for a fit that did not converge to be tried again
 
 // These numbers say how fits are run.
@@ -109,8 +110,8 @@ void fit_overlooked(const RankingProblem& problem, SingleEffects& singles) {
   singles.update_top();
 }
 
-bool near_the_top(const SingleEffects& singles, const RankedCause& cause) {
-  return cause.evidence >= refined_share * singles.top - refined_margin;
+bool near_the_top(const SingleEffects& singles, const RankedCause& cause, double share) {
+  return cause.evidence >= share * singles.top - near_margin;
 }
 
 // A recalibration that took a large effect up may hold the effect's own fit off its optimum, so that the nuisances are
@@ -120,8 +121,8 @@ void refit_from_stated(const RankingProblem& problem, SingleEffects& singles) {
   markov::parallel_for(singles.causes.size(), problem.threads, [&](std::size_t i) {
     problem.heartbeat();
     RankedCause& cause = singles.causes[i];
-    if (!cause.fitted() || cause.terms[0].candidate->parameters.empty() || !near_the_top(singles, cause) ||
-        cause.fit.log_likelihood - cause.fit.penalised < strained)
+    if (!cause.fitted() || cause.terms[0].candidate->parameters.empty() ||
+        !near_the_top(singles, cause, restarted_share) || cause.fit.log_likelihood - cause.fit.penalised < strained)
       return;
     Fit other = fit(problem.model, stated, cause.terms,
                     {.count = {}, .refit_nuisances = true, .most_iterations = problem.effort.most_iterations});
@@ -206,7 +207,7 @@ void refine_leaders(const RankingProblem& problem, SingleEffects& singles) {
       strongest(problem, singles, [](const RankedCause& cause) { return !cause.terms[0].candidate->refine.empty(); });
   markov::parallel_for(leaders.size(), problem.threads, [&](std::size_t k) {
     problem.heartbeat();
-    if (near_the_top(singles, singles.causes[leaders[k]])) refine_effect(problem, singles, leaders[k]);
+    if (near_the_top(singles, singles.causes[leaders[k]], refined_share)) refine_effect(problem, singles, leaders[k]);
   });
 }
 

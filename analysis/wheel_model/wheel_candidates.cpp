@@ -164,7 +164,7 @@ WheelCandidate slope_profile(const WheelDesign& design) {
   // A bend anywhere is a step in the slope: these are stretches whose middle lies there.
   for (const double share : {0.25, 0.375, 0.5, 0.625, 0.75})
     c.candidate.variants.push_back({2, 0, 2 * share * design.furthest});
-  c.candidate.refine = {0, 0, 0.25 * design.furthest};
+  c.candidate.refine = {0, 0.25 * design.furthest, 0.25 * design.furthest};
   c.candidate.report = [](const Values& variant, const Values& v) {
     return std::vector<NamedValue>{{"sag_m", v[0]}, {"from_m", variant[1]}, {"to_m", variant[2]}};
   };
@@ -173,7 +173,7 @@ WheelCandidate slope_profile(const WheelDesign& design) {
   };
   c.apply = [](Extension& e, const Values& variant, const Values& v) {
     e.geometry.sag_shape = static_cast<Extension::Geometry::Shape>(static_cast<int>(variant[0]));
-    e.geometry.sag_from = variant[1];
+    e.geometry.sag_from = std::max(0.0, variant[1]);  // before the first foot there is no ramp to sag
     e.geometry.sag_to = variant[2];
     e.geometry.sag = v[0];
   };

@@ -106,34 +106,34 @@ void ExtendedWheel::read_landings_at_own_inertia() {
   if (!same) landings_ = std::make_shared<const LandingShares>(landings_->of_gyration(gyration_sq));
 }
 
-double ExtendedWheel::local_slope(double position) const {
-  if (!profile_) return slope_;
+// Returns how deep the surface lies under the plane of the stated slope.
+double ExtendedWheel::depth(double position) const {
   const Extension::Geometry& ground = extension_.geometry;
   const double half = (ground.sag_to - ground.sag_from) / 2;
   const double t = (position - ground.sag_from) / half - 1;  // -1..1 along the stretch
-  double change = 0;
-  if (std::abs(t) <= 1.05) {
-    switch (ground.sag_shape) {
-      case Extension::Geometry::Shape::parabola:
-        change = -2 * ground.sag / half * t;
-        break;
-      case Extension::Geometry::Shape::sine:
-        change = ground.sag * pi / (2 * half) * std::cos(pi / 2 * (t + 1));
-        break;
-      case Extension::Geometry::Shape::step:
-        change = (t < 0 ? ground.sag : -ground.sag) / half;
-        break;
-    }
+  if (std::abs(t) >= 1) return 0;
+  switch (ground.sag_shape) {
+    case Extension::Geometry::Shape::sine:
+      return ground.sag * std::cos(pi / 2 * t);
+    case Extension::Geometry::Shape::step:
+      return ground.sag * (1 - std::abs(t));
+    case Extension::Geometry::Shape::parabola:
+      break;
   }
-  return slope_ + change;
+  return ground.sag * (1 - t * t);
+}
+
+double ExtendedWheel::chord_slope(double from, double to) const {
+  if (!profile_) return slope_;
+  return slope_ + std::atan((depth(to) - depth(from)) / (to - from));
 }
 
 ExtendedWheel::Path ExtendedWheel::path(const StepContext& context) const {
   const Leg& leg = geometry_[index(context.leg)];
   const Triangle& ahead = geometry_[index(context.leg + 1)].triangle;
   Path p;
-  p.start = leg.triangle.beta_second_rad + local_slope(context.position - leg.triangle.chord / 2);
-  p.end = pi - (ahead.beta_first_rad - local_slope(context.position + ahead.chord / 2));
+  p.start = leg.triangle.beta_second_rad + chord_slope(context.position - leg.triangle.chord, context.position);
+  p.end = pi - (ahead.beta_first_rad - chord_slope(context.position, context.position + ahead.chord));
   const double weight = 2 * model_.mass * model_.gravity / leg.inertia;
   p.inertia = leg.inertia;
   p.pendulum = weight * leg.length;
@@ -222,7 +222,7 @@ Collision ExtendedWheel::collision(const StepContext& context, double omega) con
   }
   c.chord = leg.triangle.chord;
   c.normal_speed = leg.triangle.chord * omega;
-  c.slope_rad = local_slope(context.position - leg.triangle.chord / 2);
+  c.slope_rad = chord_slope(context.position - leg.triangle.chord, context.position);
   return c;
 }
 

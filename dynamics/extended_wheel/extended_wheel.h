@@ -158,7 +158,9 @@ class ExtendedWheel {
   Leg leg_of(const Wheel& stated, const Wheel& wheel, std::size_t k) const;
   void hold_against_stated(const ExtendedWheel& stated);
   void read_landings_at_own_inertia();
-  double local_slope(double position) const;
+  double depth(double position) const;
+  /// Returns the slope of the line between two footholds [rad].
+  double chord_slope(double from, double to) const;
   Path path(const StepContext& context) const;
   double work(const Path& path, double omega_plus_squared) const;
   Collision collision(const StepContext& context, double omega) const;
