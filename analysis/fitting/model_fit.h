@@ -55,8 +55,8 @@ struct FitOptions {
   /// them.
   const Evaluation* evaluation = nullptr;
   const Derivatives* derivatives = nullptr;
-  /// If true, the entries of the last term's variant that may be refined are fitted, too, each within its spacing; their
-  /// derivatives come last.
+  /// If true, the entries of the last term's variant that may be refined are fitted, too, each within its spacing;
+  /// their derivatives come last.
   bool last_variant_too = false;
   /// If true, a step that rises about as it foretold is the last. The fit's derivatives are those before it, then.
   bool ends_as_foretold = false;

@@ -166,7 +166,7 @@ WheelCandidate slope_profile(const WheelDesign& design) {
     c.candidate.variants.push_back({2, 0, 2 * share * design.furthest});
   c.candidate.refine = {0, 0.25 * design.furthest, 0.25 * design.furthest};
   c.candidate.report = [](const Values& variant, const Values& v) {
-    return std::vector<NamedValue>{{"sag_m", v[0]}, {"from_m", variant[1]}, {"to_m", variant[2]}};
+    return std::vector<NamedValue>{{"sag_m", v[0]}, {"from_m", std::max(0.0, variant[1])}, {"to_m", variant[2]}};
   };
   c.candidate.form_of = [end = design.ramp_length](const Values& v) {
     return FittedForm{{0, v[1], v[2] > 0 ? v[2] : end}, {v[0]}};
