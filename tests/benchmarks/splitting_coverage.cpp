@@ -111,7 +111,8 @@ int main(int argc, char** argv) {
             markov::splitting_study(tried.map, tried.start, {.seed = static_cast<std::uint64_t>(seed), .threads = 1});
         const double deviation = std::log(study.steps.value / tried.steps),
                      half = 0.5 * std::log(study.steps.upper / study.steps.lower);
-        held += std::abs(deviation) <= std::hypot(half, markov::normal_95 * tried.relative_error);
+        held += study.disagreement.empty() &&
+                std::abs(deviation) <= std::hypot(half, markov::normal_95 * tried.relative_error);
         refused += !study.disagreement.empty();
         if (!study.disagreement.empty()) fmt::print("  seed {}: {}\n", seed, study.disagreement);
         width += half / seeds, off += deviation / seeds;
