@@ -23,6 +23,8 @@ constexpr double shortest_burn_in = 30;  // steps, as memory that is not linear 
 constexpr double refused_level = 1e-3;
 constexpr std::size_t walks_of_a_round = 1000;  // that failed, whose last steps are kept
 constexpr double widest = 4;                    // upper over lower end of an interval that is given
+constexpr std::uint64_t most_attempts = 3;      // at levels that agree, and the streams that each may use
+constexpr std::uint64_t streams_of_an_attempt = 1 << 14;
 
 /// One independent ensemble and what was seen of it.
 struct Round {
@@ -42,23 +44,9 @@ class Study {
       : map_(map), start_(start), options_(options) {}
 
   SplittingStudy run() {
-    learn();
-    if (std::ranges::any_of(pilots_, &LevelPilot::all_fail)) return walk_until_all_fail();
-    rounds_.resize(static_cast<std::size_t>(options_.rounds));
+    if (!begin()) return walk_until_all_fail();
     const std::uint64_t revolution = static_cast<std::uint64_t>(map_.phases);
-    burn_in_ = whole(std::max({3 * mixing_, 2.0 * static_cast<double>(window_), shortest_burn_in}), revolution);
-    std::uint64_t more = whole(std::max({4 * mixing_, 4.0 * static_cast<double>(window_), 100.0}), 2 * revolution);
-    const double first_walk =
-        static_cast<double>(burn_in_ + more) * static_cast<double>(options_.replicas) * options_.rounds;
-    if (first_walk > static_cast<double>(options_.most_calls))
-      throw std::runtime_error(fmt::format(
-          "splitting: the start is forgotten in some {:.3g} steps, so that the rounds would take {:.3g} steps of "
-          "the map: no number is given",
-          mixing_, first_walk));
     for (;;) {
-      walk(more);
-      if (std::ranges::any_of(rounds_, [](const Round& round) { return round.ensemble->all_failed(); }))
-        return walk_until_all_fail();
       estimate();
       const double half = 0.5 * std::log(found_.steps.upper / found_.steps.lower);
       if (half <= options_.tolerance && found_.lines >= fewest_lines) break;
@@ -69,7 +57,7 @@ class Study {
                                 (static_cast<double>(options_.replicas) * options_.rounds);
       const auto taken = static_cast<double>(rounds_.front().shares.size());
       if (affordable < 0.25 * taken) break;
-      more = whole(std::min(wanted * taken, affordable), 2 * revolution);
+      if (!walk(whole(std::min(wanted * taken, affordable), 2 * revolution))) return walk_until_all_fail();
     }
     judge();
     if (options_.last_steps > 0) tell_failing();
@@ -86,8 +74,41 @@ class Study {
     if (options_.progress) options_.progress(share);
   }
 
+  /// Learns levels and walks a first stretch by them, and anew by others where these disagree: one pilot in some
+  /// hundred learns a level that misses the way to failure, and its rounds would take very many steps. Returns whether
+  /// walks are left.
+  bool begin() {
+    const std::uint64_t revolution = static_cast<std::uint64_t>(map_.phases);
+    for (attempt_ = 0;; ++attempt_) {
+      learn();
+      if (std::ranges::any_of(pilots_, &LevelPilot::all_fail)) return false;
+      rounds_.clear();
+      rounds_.resize(static_cast<std::size_t>(options_.rounds));
+      burn_in_ = whole(std::max({3 * mixing_, 2.0 * static_cast<double>(window_), shortest_burn_in}), revolution);
+      const std::uint64_t first =
+          whole(std::max({4 * mixing_, 4.0 * static_cast<double>(window_), 100.0}), 2 * revolution);
+      const double first_walk =
+          static_cast<double>(burn_in_ + first) * static_cast<double>(options_.replicas) * options_.rounds;
+      if (first_walk > static_cast<double>(options_.most_calls))
+        throw std::runtime_error(fmt::format(
+            "splitting: the start is forgotten in some {:.3g} steps, so that the rounds would take {:.3g} steps of "
+            "the map: no number is given",
+            mixing_, first_walk));
+      if (!walk(first)) return false;
+      if (attempt_ + 1 == most_attempts) return true;
+      estimate();
+      if (pilots_disagree() >= refused_level) return true;
+      for (const Round& round : rounds_) lost_calls_ += round.ensemble->calls();
+      scatter_of_steps_ = scatter_of_rate_ = 0;
+    }
+  }
+
+  /// Returns the stream of a pilot or a round.
+  std::uint64_t stream(std::uint64_t number) const { return attempt_ * streams_of_an_attempt + number; }
+
   void learn() {
-    pilots_.resize(static_cast<std::size_t>(options_.pilots));
+    mixing_ = 0, window_ = 1;
+    pilots_.assign(static_cast<std::size_t>(options_.pilots), {});
     const auto told = one_at_a_time([this] { tell(0); });
     parallel_for(pilots_.size(), options_.threads, [&](std::size_t k) {
       pilots_[k] = level_pilot(map_, start_,
@@ -95,18 +116,19 @@ class Study {
                                 .replicas = options_.replicas,
                                 .most_calls = options_.most_calls / 4 / pilots_.size(),
                                 .seed = options_.seed,
-                                .stream = 1000 + k,
+                                .stream = stream(1000 + k),
                                 .told = told});
     });
     for (const LevelPilot& pilot : pilots_) {
       mixing_ = std::max(mixing_, pilot.mixing_steps);
       window_ = std::max(window_, pilot.window);
       calls_ += pilot.calls;
+      found_.pilot_calls += pilot.calls;
     }
-    found_.pilot_calls = calls_;
   }
 
-  void walk(std::uint64_t more) {
+  /// Returns whether walks are left in all rounds.
+  bool walk(std::uint64_t more) {
     const std::uint64_t before = rounds_.front().shares.size();
     const double whole_work =
         static_cast<double>(rounds_.size()) * static_cast<double>(more + (before == 0 ? burn_in_ : 0));
@@ -115,7 +137,7 @@ class Study {
     parallel_for(rounds_.size(), options_.threads, [&](std::size_t r) {
       Round& round = rounds_[r];
       if (!round.ensemble) {
-        round.ensemble = std::make_unique<WeightedEnsemble>(map_, start_, options_.replicas, options_.seed, r);
+        round.ensemble = std::make_unique<WeightedEnsemble>(map_, start_, options_.replicas, options_.seed, stream(r));
         round.ensemble->set_levels(pilots_[r % pilots_.size()].levels);
         for (std::uint64_t n = 0; n < burn_in_ && !round.ensemble->all_failed(); ++n) {
           round.early.push_back(round.ensemble->advance());
@@ -130,6 +152,7 @@ class Study {
       }
     });
     count_calls();
+    return std::ranges::none_of(rounds_, [](const Round& round) { return round.ensemble->all_failed(); });
   }
 
   void count_calls() {
@@ -338,7 +361,7 @@ class Study {
   std::vector<LevelPilot> pilots_;
   std::vector<Round> rounds_;
   double mixing_ = 0, scatter_of_steps_ = 0, scatter_of_rate_ = 0;
-  std::uint64_t window_ = 1, burn_in_ = 0, calls_ = 0, lost_calls_ = 0;
+  std::uint64_t window_ = 1, burn_in_ = 0, calls_ = 0, lost_calls_ = 0, attempt_ = 0;
   SplittingStudy found_;
 };
 

@@ -58,7 +58,8 @@ MeshEstimate steps_from_quasi_stationary(const SplittingStudy& study);
 /// begins, and then until the failure rates of all give an interval as narrow as asked, or most_calls is reached.
 /// Expected steps are the survival's sum through the burn-in, and the rate beyond. The intervals are Student's, of the
 /// logarithm, over the jackknife's values of the rounds; they are looked at each time the rounds have walked on, and
-/// the largest scatter seen counts, because an interval that ends the walk may be narrow by chance. Where all replicas
+/// the largest scatter seen counts, because an interval that ends the walk may be narrow by chance. Where the pilots'
+/// levels disagree in a first stretch (at a level of 0.001), all is begun anew, twice at most. Where all replicas
 /// of one ensemble fail, the rounds start anew, without levels, and walk until all of theirs have failed.
 ///
 /// No number is given where fewer than 30 independent lines lead to failure (a line is founded one to two windows
