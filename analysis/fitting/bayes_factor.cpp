@@ -7,7 +7,7 @@ namespace metastable::analysis {
 
 namespace {
 
-// Returns the expected gain a parameter: what is expected before, or more where the data ask for it.
+// Returns the expected gain a parameter: the rule's, or the larger one that makes the evidence of this gain largest.
 double expected_of(double gain, double parameters, const Rules& rules) {
   return std::max(rules.expected_gain, gain - parameters) / std::max(1.0, parameters);
 }
@@ -40,7 +40,7 @@ double evidence_of(const ScannedEffect& scanned, double gain, const Rules& rules
 
 namespace {
 
-// Returns what is gained beyond an error of form of what was gained before.
+// Returns the part of a gain that an error of form of the gain before it does not account for, phase by phase.
 double beyond_form(const PhaseGain& now, const PhaseGain& before, const Rules& rules) {
   const double tolerated = rules.square_error();
   return std::max(0.0, now.collisions - tolerated * std::max(0.0, before.collisions)) +

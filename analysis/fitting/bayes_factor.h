@@ -25,7 +25,7 @@ PhaseGain phase_gain(const TransitionModel& model, const Fit& better, const Fit&
 /// gained in the same phase. @param exact  the part of the first that has no error of form (exact_part)
 double earned(const TransitionModel& model, const Fit& pair, const Fit& first, const Fit& exact, const Rules& rules);
 
-/// Returns what the scores promise that a second effect will have earned. @param scanned  beside the first
+/// Foretells earned() of a second effect, from its score test beside the first. @param scanned  that score test
 double promised_to_earn(const TransitionModel& model, const ScannedEffect& scanned, const Fit& first, const Fit& exact,
                         const Rules& rules);
 

@@ -16,8 +16,8 @@ constexpr double far_gain = 100;       // promised by the best variant, beyond w
 constexpr double furthest_start = 0.25;  // share of a parameter's range
 constexpr double small_start = 0.1;      // share of a size worth starting from, where the scores' start was a bad one
 constexpr double worth_moving = 0.2;     // rise of the log likelihood
-constexpr int most_refinements = 10;     // of a variant, while it moves
-constexpr int most_kinds = 3;            // are refined one after the other
+constexpr int most_refinements = 10;     // rounds of moves, each half as long, while a variant still moves
+constexpr int most_kinds = 3;            // kinds of a variant that are refined one after the other
 
 // Says whether two variants are two kinds of one thing, as a leg's friction and its restitution: they differ in one
 // entry only, of which the list has no third value.
@@ -57,7 +57,7 @@ bool is_far_off(const std::vector<double>& scores) {
   return sum > count * widest + sds * std::sqrt(2 * count);
 }
 
-// Fits the best variant from its neutral values, where the scan has its slopes.
+// Fits the best variant from its neutral values. The scan took its slopes there, which the first step then uses.
 Fit fit_from_neutral(const TransitionModel& model, const Fit& base, const ScannedEffect& scanned, FitOptions options) {
   std::vector<EffectTerm> terms = base.terms;
   terms.push_back({scanned.candidate, scanned.candidate->variants[scanned.best], {}});
@@ -74,13 +74,14 @@ Fit fit_from_neutral(const TransitionModel& model, const Fit& base, const Scanne
   return fit(model, base.nuisance, terms, options);
 }
 
-// Moves the last term's variant between the list's values.
+// Searches for the best variant of the last term, between the variants that the catalogue lists.
 class VariantSearch {
  public:
   VariantSearch(const TransitionModel& model, const Effort& effort, Fit& best)
       : model_(model), effort_(effort), best_(best), candidate_(*best.terms.back().candidate) {}
 
-  // Moves entry by entry as long as the likelihood rises, by halved moves, and to the tops of parabolas between them.
+  // Moves one entry after the other as long as the likelihood rises. Each round's moves are half as long as those of
+  // the round before. Where neither direction rises, the top of the parabola through the three likelihoods is tried.
   bool halve_moves() {
     bool moved = false, moving = true;
     double share = 0.5;
@@ -93,10 +94,11 @@ class VariantSearch {
     return moved;
   }
 
-  // Moves all entries together with what is fitted.
+  // Fits all entries together with the parameters.
   bool move_together() { return take(fitted(best_.terms)); }
 
-  // Takes another kind, where an entry has values that are not refined, and moves that.
+  // Tries the other kinds of the effect (entries whose values are not refined, as the shape of a sag), each with its
+  // other entries fitted.
   bool change_kind() {
     bool changed = false;
     for (std::size_t entry = 0; entry < candidate_.refine.size(); ++entry) {

@@ -93,14 +93,14 @@ void fit_pairs(const RankingProblem& problem, const SingleEffects& singles, cons
   }
 }
 
-// An effect as a pair has it, from where it is fitted alone.
+// Names an effect of a pair. Its values in the pair are a start for a fit of that effect alone.
 struct OtherWay {
   const RankedCause* pair;
   std::size_t term;
 };
 
-// Lists the effects that may have a better optimum alone where a pair has them: of pairs that gain beyond their first
-// effect this one, and of pairs that gain much more together than alone the second one, too.
+// Lists the effects whose values in a pair may lie near an optimum that their own fits have missed. The first effect of
+// a pair is listed where the pair gains beyond it, the second one where the two gain much more together than alone.
 std::vector<OtherWay> other_ways(const RankingProblem& problem, const EffectPairs& ranked) {
   std::vector<double> gains;
   for (const RankedCause& pair : ranked.pairs) gains.push_back(std::isfinite(pair.evidence) ? pair.gain : -1);
@@ -125,7 +125,7 @@ std::vector<OtherWay> other_ways(const RankingProblem& problem, const EffectPair
   return ways;
 }
 
-// A pair may gain beyond its effects because its fit came upon a better optimum of one of them.
+// Fits the effects of other_ways() alone, from where the pairs have them, and takes the fits that are better.
 void refit_from_pairs(const RankingProblem& problem, EffectPairs& ranked, ScansBeside& beside) {
   SingleEffects& singles = ranked.singles;
   const std::vector<OtherWay> ways = other_ways(problem, ranked);

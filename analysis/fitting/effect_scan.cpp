@@ -22,7 +22,7 @@ namespace {
 
 constexpr double largest_step = 0.1, small_step = 0.05;  // of a difference, in standard errors
 constexpr std::size_t most_scanned = 24;                 // variants of an effect that are scanned beside another one
-// Where fewer columns than this add to one number, each is differenced by itself.
+// Each column takes a difference of its own where fewer columns than this add to one number of the model.
 constexpr std::size_t fewest_columns = 4;
 constexpr double far_out = 0.03;  // share of the draws beyond which a tail follows its law instead of their count
 
@@ -212,8 +212,8 @@ std::vector<ScannedColumn> fill_by_responses(const TransitionModel& model, const
   return others;
 }
 
-// Projects what the fitted parameters could take up out of scores and information, which makes them efficient, and
-// returns the columns without it.
+// Projects what the fitted parameters could take up out of scores and information, which makes them efficient. Returns
+// the columns after that projection.
 Derivatives project(const TransitionModel& model, const Fit& fit, const Derivatives& all, EffectScan& scan) {
   const Eigen::Index events = all.slope.rows();
   const Eigen::Map<const Eigen::VectorXd> z(fit.evaluation.score.data(), events);
@@ -245,7 +245,8 @@ Derivatives project(const TransitionModel& model, const Fit& fit, const Derivati
   return efficient;
 }
 
-// Returns what the best variant of an effect promises in each phase: its gain, in the shares of the information there.
+// Divides the gain that the best variant of an effect promises between stances and collisions, in proportion to the
+// information that each holds.
 PhaseGain gain_by_phase(const TransitionModel& model, const Fit& fit, const Derivatives& efficient,
                         const ScannedEffect& effect) {
   const Eigen::VectorXd& start = effect.start[effect.best];

@@ -23,7 +23,7 @@ struct ScannedEffect {
   std::vector<Eigen::VectorXd> start;  ///< by variant: the values they point to
   std::vector<Eigen::Index> first;     ///< by variant: first of its columns
   std::size_t best = 0;                ///< variant
-  PhaseGain by_phase = {};             ///< of the best variant's gain
+  PhaseGain by_phase = {};             ///< the best variant's gain, divided between stances and collisions
   Derivatives columns = {};            ///< those of the best variant, at neutral values
 };
 

@@ -21,7 +21,7 @@ constexpr double near_top = 4;              // evidence below the best, of a pai
 constexpr double worth_a_round = 4;  // evidence that swaps gained, for another round of them: alike effects gain less
 constexpr int most_swaps = 3;        // rounds of effects put in the place of others
 constexpr std::size_t most_extended = 3;  // pairs
-constexpr int times_longer = 4;           // is the fit of a leading set that did not converge
+constexpr int times_longer = 4;           // iterations of a leading set's fit that did not converge, over those before
 
 constexpr double hardly_more = 9;  // by a set beyond one of its parts: less, and the part bounds it in any case
 
@@ -54,7 +54,7 @@ auto find_set(const std::vector<RankedCause>& all, const std::vector<EffectTerm>
       all, [&](const RankedCause& one) { return one.terms.size() == terms.size() && extends(one.terms, terms); });
 }
 
-// Weighs what the scores promise that one more effect will have earned.
+// Returns the evidence that one more effect would add, by what its score test promises that it will earn.
 double promised_evidence(const RankingProblem& problem, const SingleEffects& singles, const RankedCause& base,
                          const ScannedEffect& more) {
   const Fit& exact = exact_part(singles.causes, base.terms, problem.recalibrated);

@@ -22,13 +22,13 @@ std::vector<const ScannedEffect*> about_as_promising(const RankingProblem& probl
 /// @param size  effects of the set, >= 2
 double log_prior_of_one_more(const RankingProblem& problem, std::size_t size);
 
-/// Lists what promises to earn most beside a hypothesis. Where the model knows better starts than the scores, the
-/// scores do not decide.
+/// Lists the effects that promise to earn most beside a hypothesis. An effect for which the model knows better starts
+/// than the scores is listed whatever its scores promise.
 /// @param scan  beside it
 std::vector<ScannedEffect> promising_beside(const RankingProblem& problem, const SingleEffects& singles,
                                             const EffectScan& scan, const RankedCause& base);
 
-/// Takes the fits of the best sets, to alike_margin, to their ends where they did not converge.
+/// Continues the fits that did not converge of the sets whose evidence is within alike_margin of the best.
 void finish_leading(const RankingProblem& problem, std::vector<RankedCause>& sets);
 
 /// Fits one more effect beside a hypothesis, and weighs the two together by what the last one earns.

@@ -27,7 +27,7 @@ constexpr int most_halvings = 7, few_halvings = 3;  // of a step; of one that is
 constexpr double much_more = 1.25, longest = 8;
 constexpr int rough_steps = 2;             // A fit that is only looked at takes so many steps by another one's slopes.
 constexpr double difference_share = 0.05;  // step of a difference, of what the data resolve
-constexpr double widening = 8;             // times as long are steps across kinks of single events' densities
+constexpr double widening = 8;             // factor on that step where kinks of single events' densities hide a slope
 
 // Holds all parameters of a hypothesis in one vector.
 class Point {
@@ -84,7 +84,7 @@ class Point {
   std::vector<Slot> slots_;
 };
 
-// How slopes are differenced: to one side, to both, or to both and further off.
+// Says between which points a slope is differenced: here and one side, both sides, or both sides further off.
 enum class Reach { one_side, both_sides, wide };
 
 Derivatives differences(Point& point, const Evaluation& here, Reach reach = Reach::one_side) {
@@ -375,7 +375,8 @@ Fit fit(const TransitionModel& model, const std::vector<double>& nuisance, const
   Climb climb(point, weights, result);
   const double start = climb.best();
   const bool finite = std::isfinite(start);
-  Reach reach = Reach::one_side;  // at a kink of some event's density one side promises what is not there
+  Reach reach =
+      Reach::one_side;  // It widens where no step rises: at a kink, one side promises a rise that is not there.
   result.converged = point.slots().empty() && finite;
   if (!finite) result.reason = "its likelihood is not finite";
   for (int iteration = 0;

@@ -88,8 +88,8 @@ Derivatives derivatives(const TransitionModel& model, const std::vector<double>&
 /// likelihood says what a fit would come to.
 Fit stepped(const TransitionModel& model, const Fit& near, const std::vector<EffectTerm>& terms);
 
-/// Fills a column with the slopes and changes of events between two evaluations that a step of a parameter lies
-/// between.
+/// Fills a column with the slopes and changes of events between two evaluations. @param step  of the parameter between
+/// them
 void fill_differences(const Evaluation& here, const Evaluation& there, double step, Eigen::Index column,
                       Derivatives& all);
 

@@ -18,10 +18,9 @@ constexpr double promise_share = 0.2;     // of the largest promised gain, less
 constexpr double promise_margin = 40;     //   this much
 constexpr double overlooked_margin = 12;  // evidence by the scores below the best fitted one, for a fit after all
 constexpr double leader_evidence = 2;     // of an effect that is refined, and that pairs are built on
-constexpr double refined_share = 0.4;     // of the best evidence, less a margin, for an effect worth refining
-constexpr double restarted_share = 0.7;   // of the best evidence, less a margin, for another start of a fit
-constexpr double near_margin = 10;        // of either
-constexpr double refit_margin = 60;       // evidence below the best, for a fit that did not converge to be tried again
+// An effect is refined, or its fit started anew, where its evidence is this share of the best, less near_margin.
+constexpr double refined_share = 0.4, restarted_share = 0.7, near_margin = 10;
+constexpr double refit_margin = 60;  // evidence below the best, for a fit that did not converge to be tried again
 
 // These numbers say how fits are run.
 constexpr int law_steps = 12;          // of another law's fit, from either start
@@ -164,8 +163,8 @@ void decide_unconverged(SingleEffects& singles) {
       cause.not_decided.clear();
 }
 
-// An effect gains as much as one with more parameters does, but for what that one earns beyond its error of form:
-// lengths of all legs follow an eccentric hub closer than the catalogue's form of it does.
+// Credits an effect with what another one with more parameters gains beyond it, as far as that is no more than an error
+// of its form. Eight leg lengths, for instance, follow an eccentric hub closer than the catalogue's form of a hub does.
 void forgive_form(const RankingProblem& problem, SingleEffects& singles) {
   const auto parameters = [](const RankedCause& cause) { return cause.terms[0].candidate->parameters.size(); };
   const auto comparable = [&](const RankedCause& cause) {

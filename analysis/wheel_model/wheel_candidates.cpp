@@ -173,7 +173,7 @@ WheelCandidate slope_profile(const WheelDesign& design) {
   };
   c.apply = [](Extension& e, const Values& variant, const Values& v) {
     e.geometry.sag_shape = static_cast<Extension::Geometry::Shape>(static_cast<int>(variant[0]));
-    e.geometry.sag_from = std::max(0.0, variant[1]);  // before the first foot there is no ramp to sag
+    e.geometry.sag_from = std::max(0.0, variant[1]);  // The ramp begins at the first foot.
     e.geometry.sag_to = variant[2];
     e.geometry.sag = v[0];
   };

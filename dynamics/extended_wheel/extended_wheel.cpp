@@ -106,7 +106,7 @@ void ExtendedWheel::read_landings_at_own_inertia() {
   if (!same) landings_ = std::make_shared<const LandingShares>(landings_->of_gyration(gyration_sq));
 }
 
-// Returns how deep the surface lies under the plane of the stated slope.
+// Returns how deep the surface lies under the plane of the stated slope [m].
 double ExtendedWheel::depth(double position) const {
   const Extension::Geometry& ground = extension_.geometry;
   const double half = (ground.sag_to - ground.sag_from) / 2;

@@ -334,8 +334,10 @@ class Learner {
   void follow_chain() {
     for (std::size_t p = 0; p < phases_; ++p) chance_[p].assign(learnt_->anchors[p].size(), 0);
     const int window = (options_.window + map_.phases - 1) / map_.phases;
-    // An anchor may land at none but itself: the window is long enough once failure is reached from no more of them.
-    std::ptrdiff_t reached = 0, before = -1;  // anchors from which failure is
+    // Some anchors may never lead to failure, as they land at none but themselves. The window is therefore long enough
+    // once one step more adds no anchor to those that lead there.
+    std::ptrdiff_t reached = 0,
+                   before = -1;  // anchors that lead to failure within the steps taken, and one step before
     int taken = 0;
     for (; taken < window || (reached > before && taken < longest_window * window); ++taken) {
       for (std::size_t p = phases_; p-- > 0;) {

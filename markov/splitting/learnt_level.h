@@ -42,8 +42,8 @@ struct LearningOptions {
 
 /// Holds the chance of failing within a window at anchors, and interpolates its logarithm between the nearest of them.
 struct LearntLevel {
-  LevelFunction level;  ///< empty where failure is not reached from any anchor
-  int window = 0;  ///< [steps], so long that in a longer one no more anchors would fail, 20 times that asked at most
+  LevelFunction level;  ///< empty where no anchor leads to failure
+  int window = 0;  ///< [steps], at most 20 times that asked: a longer one would let no more anchors lead to failure
   std::uint64_t calls = 0;  ///< rows that the map was asked for
 };
 

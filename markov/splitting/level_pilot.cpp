@@ -71,7 +71,7 @@ class Pilot {
                                           .seed = options_.seed,
                                           .stream = options_.stream + 100 * lesson++});
         more_calls_ += learnt.calls;
-        if (!learnt.level) {  // Replicas have failed, but those that are visited now are too far from it to learn from.
+        if (!learnt.level) {  // Replicas have failed before, but no state that is visited now leads to failure.
           if (!push()) return finish(true);
           continue;
         }

@@ -21,10 +21,10 @@ namespace {
 constexpr double fewest_lines = 30;
 constexpr double shortest_burn_in = 30;  // steps, as memory that is not linear is seen in part only
 constexpr double refused_level = 1e-3;
-constexpr std::size_t walks_of_a_round = 1000;  // that failed, whose last steps are kept
-constexpr double widest = 4;                    // upper over lower end of an interval that is given
-constexpr std::uint64_t most_attempts = 3;      // at levels that agree, and the streams that each may use
-constexpr std::uint64_t streams_of_an_attempt = 1 << 14;
+constexpr std::size_t walks_of_a_round = 1000;            // that failed, whose last steps are kept
+constexpr double widest = 4;                              // upper over lower end of an interval that is given
+constexpr std::uint64_t most_attempts = 3;                // to learn levels that agree
+constexpr std::uint64_t streams_of_an_attempt = 1 << 14;  // streams of random numbers that one attempt may use
 
 /// One independent ensemble and what was seen of it.
 struct Round {
@@ -74,9 +74,9 @@ class Study {
     if (options_.progress) options_.progress(share);
   }
 
-  /// Learns levels and walks a first stretch by them, and anew by others where these disagree: one pilot in some
-  /// hundred learns a level that misses the way to failure, and its rounds would take very many steps. Returns whether
-  /// walks are left.
+  /// Learns levels and lets the rounds walk a first stretch by them. Where rounds of different levels find different
+  /// failure rates, new levels are learnt: now and then a pilot learns a level that misses the way to failure, and its
+  /// rounds would need very many steps. Returns whether walks are left.
   bool begin() {
     const std::uint64_t revolution = static_cast<std::uint64_t>(map_.phases);
     for (attempt_ = 0;; ++attempt_) {

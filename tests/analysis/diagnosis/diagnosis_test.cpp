@@ -254,8 +254,8 @@ class TwoOptima : public test::Line {
 
 // What an effect gains by another optimum of the nuisances is not its own. (Two free runs of a drum differed by a
 // sensor's bias for it.)
-// Where speeds are exact to their digits gains are of millions. Lengths of eight legs close all of the gap, noise
-// beside them next to all.
+// An effect gains millions where the speeds are exact to their digits. Other leg lengths close the whole gap here, and
+// a larger noise of the sensor closes 99.9 % of it: the legs must be named, and not the noise.
 TEST(Diagnosis, NamesLegsWhereSpeedsAreExact) {
   const std::vector<double> lengths{0.1520, 0.1521, 0.1521, 0.1510, 0.1517, 0.1507, 0.1526, 0.1529};
   const Experiment experiment = in_laboratory({.effects = {{"leg_lengths", lengths}}, .seed = 7});
@@ -266,8 +266,8 @@ TEST(Diagnosis, NamesLegsWhereSpeedsAreExact) {
   EXPECT_EQ(d.causes.set, std::vector<std::string>{"leg_lengths"});
 }
 
-// An eccentric hub acts much like other legs, which have more parameters to follow it with. Beside a drag the pair is
-// named, and no leg.
+// Eight leg lengths can imitate an eccentric hub closely. The diagnosis must name the drag and the hub, which were
+// added, and no leg.
 TEST(Diagnosis, NamesADragBesideAnEccentricHub) {
   const Experiment experiment = in_laboratory(
       {.effects = {{"air_drag", {0.0012}}, {"hub_eccentricity", {0.002, 1.5}}}, .sensor_noise = 0.008, .seed = 9});
@@ -278,7 +278,8 @@ TEST(Diagnosis, NamesADragBesideAnEccentricHub) {
   EXPECT_EQ(d.causes.set, std::vector<std::string>{"air_drag+hub_eccentricity"});
 }
 
-// The end of a sag lies between those that are listed, and its size hangs on it.
+// The catalogue lists some ends of a sag, and this sag ends between two of them. The diagnosis must find its end and
+// its depth.
 TEST(Diagnosis, FindsWhereASagEnds) {
   const Experiment experiment =
       in_laboratory({.effects = {{"slope_profile", {-0.0055, 0, 1.83}}}, .sensor_noise = 0.008, .seed = 7});

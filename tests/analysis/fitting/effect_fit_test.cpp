@@ -72,7 +72,7 @@ TEST(EffectFit, TriesTheOtherKindOfALargeEffectWhateverItsScorePromises) {
   EXPECT_NEAR(found.terms.back().values[0], 1, 0.1);
 }
 
-// A wave whose frequency is 1.3417, where 1.3 is listed.
+// The data hold a wave of frequency 1.3417, and the catalogue lists 1.3 only.
 class Tuned : public test::Line {
  public:
   explicit Tuned(const Line& from) : Line(from) {
@@ -96,7 +96,8 @@ class Tuned : public test::Line {
   }
 };
 
-// Moves that are halved three times come to within 0.0125 of it, where its gain is still far from the largest.
+// Three rounds of halved moves would end up to 0.0125 away from the frequency. The search must go on until the variant
+// stands still.
 TEST(EffectFit, RefinesAVariantUntilItMovesNoMore) {
   const Tuned model(line(0, 5, 600));
   const Candidate* candidate = &model.candidates()[0];
@@ -108,16 +109,15 @@ TEST(EffectFit, RefinesAVariantUntilItMovesNoMore) {
   EXPECT_GT(found.penalised, before + 10);
 }
 
-// A gain is worth half of itself, less what its parameters cost, however large it is: a fixed expected gain took 18 %
-// of one by eight parameters.
+// The evidence of a gain is half of that gain, less what the parameters cost, however large the gain is.
 TEST(Evidence, OfALargeGainIsHalfOfIt) {
   const Rules rules;
   for (const double parameters : {1.0, 2.0, 8.0})
     EXPECT_NEAR(evidence_of_gain(1e8, parameters, rules), 0.5e8 - 0.5 * parameters * (1 + std::log(1e8 / parameters)),
                 1e-3);
-  // Of what is expected, and less, it is the normal prior's.
+  // A gain no larger than the expected one has the evidence of a normal prior with that expected gain.
   EXPECT_NEAR(evidence_of_gain(20, 1, rules), 0.5 * 36.0 / 37 * 20 - 0.5 * std::log(37), 1e-12);
-  // It is the largest over all priors that expect as much as the rule says or more.
+  // No prior that expects as much as the rule says, or more, gives a gain more evidence.
   for (const double gain : {40.0, 200.0, 5000.0})
     for (const double expected : {36.0, 60.0, 1000.0, 6000.0}) {
       Rules fixed;

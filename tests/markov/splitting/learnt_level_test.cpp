@@ -12,7 +12,8 @@
 namespace metastable::markov {
 namespace {
 
-// What an ensemble of x' = x / 2 + 1 + sd z visits, and what is learnt of it. It fails below 0.
+// Lets an ensemble walk by the map x' = x / 2 + 1 + sd z, which fails below 0, and learns a level from the states that
+// it visits.
 LearntLevel learnt(double sd) {
   const BatchMap map = testing::linear_batch(sd);
   const std::vector<double> start{2};
@@ -37,7 +38,8 @@ TEST(LearntLevel, IsHigherWhereFailureIsNearer) {
   EXPECT_GT(levels[1], levels[2]);
 }
 
-// A level of chances that are all zero would split nothing.
+// With an sd of 0.05 no visited state leads to failure. A level learnt from chances that are all zero would split
+// nothing, so that none is given.
 TEST(LearntLevel, IsNoneWhereFailureIsNotReached) {
   const LearntLevel found = learnt(0.05);
   EXPECT_FALSE(found.level);
