@@ -255,7 +255,7 @@ class TwoOptima : public test::Line {
 // What an effect gains by another optimum of the nuisances is not its own. (Two free runs of a drum differed by a
 // sensor's bias for it.)
 // An effect gains millions where the speeds are exact to their digits. Other leg lengths close the whole gap here, and
-// a larger noise of the sensor closes 99.9 % of it: the legs must be named, and not the noise.
+// a larger noise of the sensor closes 99.999 % of it: the legs must be named, and not the noise.
 TEST(Diagnosis, NamesLegsWhereSpeedsAreExact) {
   const std::vector<double> lengths{0.1520, 0.1521, 0.1521, 0.1510, 0.1517, 0.1507, 0.1526, 0.1529};
   const Experiment experiment = in_laboratory({.effects = {{"leg_lengths", lengths}}, .seed = 7});
