@@ -49,14 +49,14 @@ std::map<std::string, double> probabilities_beside_unnamed(const TransitionModel
   const std::function<void()> beat = markov::one_at_a_time(heartbeat);
   const std::vector<std::size_t> leading = leading_variations(model, scan, alone, options.rules);
   std::vector<Fit> with(leading.size());
-  markov::parallel_for(with.size(), options.threads, [&](std::size_t k) {
+  model.side_by_side(with.size(), options.threads, [&](std::size_t k) {
     beat();
     with[k] = fit_one_more(model, effort, best.fit, scan.effects[leading[k]], true);
   });
   const Fit& joined = *std::ranges::max_element(with, {}, &Fit::penalised);
   if (!(joined.penalised >= best.fit.penalised)) return {};
   std::vector<double> probability(best.terms.size());
-  markov::parallel_for(best.terms.size(), options.threads, [&](std::size_t k) {
+  model.side_by_side(best.terms.size(), options.threads, [&](std::size_t k) {
     beat();
     std::vector<EffectTerm> others = joined.terms;
     others.erase(others.begin() + static_cast<std::ptrdiff_t>(k));

@@ -79,7 +79,7 @@ void add_asked_pairs(const RankingProblem& problem, SingleEffects& singles,
 void fit_pairs(const RankingProblem& problem, const SingleEffects& singles, const std::vector<Try>& tries,
                std::vector<RankedCause>& pairs) {
   std::vector<RankedCause> tried(tries.size());
-  markov::parallel_for(tries.size(), problem.threads, [&](std::size_t i) {
+  problem.model.side_by_side(tries.size(), problem.threads, [&](std::size_t i) {
     problem.heartbeat();
     tried[i] = with_one_more(problem, singles, singles.causes[tries[i].leader], tries[i].second);
   });
@@ -130,7 +130,7 @@ void refit_from_pairs(const RankingProblem& problem, EffectPairs& ranked, ScansB
   SingleEffects& singles = ranked.singles;
   const std::vector<OtherWay> ways = other_ways(problem, ranked);
   std::vector<Fit> again(ways.size());
-  markov::parallel_for(ways.size(), problem.threads, [&](std::size_t k) {
+  problem.model.side_by_side(ways.size(), problem.threads, [&](std::size_t k) {
     problem.heartbeat();
     again[k] = fit(problem.model, ways[k].pair->fit.nuisance, {ways[k].pair->terms[ways[k].term]},
                    {.count = {}, .refit_nuisances = true, .most_iterations = problem.effort.most_iterations});

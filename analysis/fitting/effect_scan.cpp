@@ -190,7 +190,7 @@ std::vector<ScannedColumn> fill_by_responses(const TransitionModel& model, const
   std::vector<std::pair<std::size_t, AddedTo*>> worth;
   for (auto& [number, added] : numbers)
     if (added.columns.size() >= fewest_columns) worth.emplace_back(number, &added);
-  markov::parallel_for(worth.size(), threads, [&](std::size_t i) {
+  model.side_by_side(worth.size(), threads, [&](std::size_t i) {
     const auto& [number, added] = worth[i];
     added->responses = std::make_unique<TransitionResponses>(model, fit, number, added->step);
   });
@@ -200,8 +200,8 @@ std::vector<ScannedColumn> fill_by_responses(const TransitionModel& model, const
     if (count == 0 || count >= added->columns.size()) added->responses.reset();
     for (std::size_t k = 0; added->responses && k < count; ++k) evaluations.emplace_back(added->responses.get(), k);
   }
-  markov::parallel_for(evaluations.size(), threads,
-                       [&](std::size_t i) { evaluations[i].first->evaluate(evaluations[i].second); });
+  model.side_by_side(evaluations.size(), threads,
+                     [&](std::size_t i) { evaluations[i].first->evaluate(evaluations[i].second); });
   for (const auto& [number, added] : numbers) {
     if (!added.responses) others.insert(others.end(), added.columns.begin(), added.columns.end());
     for (std::size_t i = 0; added.responses && i < added.columns.size(); ++i) {
@@ -284,7 +284,7 @@ EffectScan scan_effects(const TransitionModel& model, const Fit& fit, const std:
   const auto events = static_cast<Eigen::Index>(model.events().size());
   Derivatives all{Eigen::MatrixXd::Zero(events, columns), Eigen::MatrixXd::Zero(events, columns)};
   const std::vector<ScannedColumn> alone = fill_by_responses(model, fit, list_columns(scanned), beside, threads, all);
-  markov::parallel_for(alone.size(), threads, [&](std::size_t i) { differentiate(model, fit, alone[i], beside, all); });
+  model.side_by_side(alone.size(), threads, [&](std::size_t i) { differentiate(model, fit, alone[i], beside, all); });
   const Derivatives efficient = project(model, fit, all, scan);
   for (ScannedEffect& effect : scan.effects) {
     const auto count = static_cast<Eigen::Index>(effect.candidate->parameters.size());

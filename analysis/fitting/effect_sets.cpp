@@ -80,7 +80,7 @@ const RankedCause& stronger(const RankingProblem& problem, const SingleEffects& 
 void add_pairs_within(const RankingProblem& problem, const SingleEffects& singles, const RankedCause& set,
                       std::vector<RankedCause>& pairs) {
   std::vector<RankedCause> found(2);
-  markov::parallel_for(2, problem.threads, [&](std::size_t without) {
+  problem.model.side_by_side(2, problem.threads, [&](std::size_t without) {
     std::vector<EffectTerm> terms = set.terms;
     terms.erase(terms.begin() + static_cast<std::ptrdiff_t>(without));
     if (find_set(pairs, terms) != pairs.end()) return;
@@ -133,7 +133,7 @@ void extend(const RankingProblem& problem, const SingleEffects& singles, const R
     return find_set(larger, terms) != larger.end();
   });
   std::vector<RankedCause> fitted(worth.size());
-  markov::parallel_for(worth.size(), problem.threads, [&](std::size_t i) {
+  problem.model.side_by_side(worth.size(), problem.threads, [&](std::size_t i) {
     problem.heartbeat();
     fitted[i] = with_one_more(problem, singles, base, worth[i]);
   });
@@ -152,7 +152,7 @@ std::vector<RankedCause> fit_alike_beside(const RankingProblem& problem, const S
     return find_set(known, terms) != known.end();
   });
   std::vector<RankedCause> fitted(tries.size());
-  markov::parallel_for(tries.size(), problem.threads, [&](std::size_t k) {
+  problem.model.side_by_side(tries.size(), problem.threads, [&](std::size_t k) {
     problem.heartbeat();
     fitted[k] = with_one_more(problem, singles, base, *tries[k]);
   });
@@ -261,7 +261,7 @@ RankedCause with_one_more(const RankingProblem& problem, const SingleEffects& si
 void finish_leading(const RankingProblem& problem, std::vector<RankedCause>& sets) {
   const RankedCause* best = best_of(sets);
   const double least = best ? best->evidence - alike_margin : 0;
-  markov::parallel_for(sets.size(), problem.threads, [&](std::size_t k) {
+  problem.model.side_by_side(sets.size(), problem.threads, [&](std::size_t k) {
     RankedCause& set = sets[k];
     if (!set.fitted() || set.fit.converged || !(set.evidence >= least)) return;
     problem.heartbeat();

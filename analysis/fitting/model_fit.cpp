@@ -29,6 +29,13 @@ constexpr int rough_steps = 2;             // A fit that is only looked at takes
 constexpr double difference_share = 0.05;  // step of a difference, of what the data resolve
 constexpr double widening = 8;             // factor on that step where kinks of single events' densities hide a slope
 
+// Holds a hypothesis with one of its parameters moved by a step.
+struct Moved {
+  double step;
+  std::vector<double> nuisance;
+  std::vector<EffectTerm> terms;
+};
+
 // Holds all parameters of a hypothesis in one vector.
 class Point {
  public:
@@ -70,6 +77,15 @@ class Point {
   const std::vector<double>& nuisance() const { return nuisance_; }
   const std::vector<EffectTerm>& terms() const { return terms_; }
   Evaluation evaluate() const { return model_.evaluate(nuisance_, terms_); }
+  // Returns the hypothesis with one parameter moved.
+  Moved moved(std::size_t slot, double step) {
+    double& value = *slots_[slot].value;
+    const double here = value;
+    value += step;
+    Moved there{step, nuisance_, terms_};
+    value = here;
+    return there;
+  }
   double log_prior() const {
     double sum = 0;
     for (const Slot& s : slots_)
@@ -87,37 +103,38 @@ class Point {
 // Says between which points a slope is differenced: here and one side, both sides, or both sides further off.
 enum class Reach { one_side, both_sides, wide };
 
-Derivatives differences(Point& point, const Evaluation& here, Reach reach = Reach::one_side) {
+Derivatives differences(const TransitionModel& model, Point& point, const Evaluation& here,
+                        Reach reach = Reach::one_side) {
   const auto events = static_cast<Eigen::Index>(here.score.size());
   auto& slots = point.slots();
   Derivatives d{Eigen::MatrixXd(events, static_cast<Eigen::Index>(slots.size())),
                 Eigen::MatrixXd(events, static_cast<Eigen::Index>(slots.size())), std::vector<double>(slots.size())};
+  std::vector<Moved> moved;
+  std::vector<std::size_t> first;  // of a slot's
   for (std::size_t p = 0; p < slots.size(); ++p) {
-    const double value = *slots[p].value;
-    const auto moved_to = [&](double there) {
-      *slots[p].value = there;
-      Evaluation moved = point.evaluate();
-      *slots[p].value = value;
-      return moved;
-    };
-    double step = slots[p].step * (reach == Reach::wide ? widening : 1);
+    const double value = *slots[p].value, step = slots[p].step * (reach == Reach::wide ? widening : 1);
     const bool above = value + step <= slots[p].upper, below = value - step >= slots[p].lower;
-    if (!above) step = -step;
-    const Evaluation moved = moved_to(value + step);
-    d.steps[p] = step;
-    Evaluation other;
+    first.push_back(moved.size());
+    d.steps[p] = above ? step : -step;
+    moved.push_back(point.moved(p, d.steps[p]));
     if (reach != Reach::one_side && above && below) {
-      other = moved_to(value - step);
-      step *= 2;
+      moved.push_back(point.moved(p, -step));
       d.steps[p] = 0;
     }
-    const Evaluation& from = d.steps[p] == 0 ? other : here;
+  }
+  std::vector<Evaluation> there(moved.size());
+  model.side_by_side(moved.size(), 1,
+                     [&](std::size_t i) { there[i] = model.evaluate(moved[i].nuisance, moved[i].terms); });
+  for (std::size_t p = 0; p < slots.size(); ++p) {
+    const bool both_sides = d.steps[p] == 0;
+    const Evaluation &up = there[first[p]], &from = both_sides ? there[first[p] + 1] : here;
+    const double step = both_sides ? moved[first[p]].step - moved[first[p] + 1].step : d.steps[p];
     for (Eigen::Index i = 0; i < events; ++i) {
       const auto k = static_cast<std::size_t>(i);
       // Events at the floor of the density have no slope there.
       d.slope(i, static_cast<Eigen::Index>(p)) =
-          std::clamp((moved.log_density[k] - from.log_density[k]) / step, -1e9, 1e9);
-      d.change(i, static_cast<Eigen::Index>(p)) = std::clamp((moved.score[k] - from.score[k]) / step, -1e9, 1e9);
+          std::clamp((up.log_density[k] - from.log_density[k]) / step, -1e9, 1e9);
+      d.change(i, static_cast<Eigen::Index>(p)) = std::clamp((up.score[k] - from.score[k]) / step, -1e9, 1e9);
     }
   }
   return d;
@@ -323,7 +340,7 @@ Eigen::MatrixXd information(const Derivatives& columns, const Evaluation& here, 
 Derivatives derivatives(const TransitionModel& model, const std::vector<double>& nuisance,
                         const std::vector<EffectTerm>& terms, const Evaluation& here, bool with_nuisances) {
   Point point(model, nuisance, terms, with_nuisances);
-  return differences(point, here);
+  return differences(model, point, here);
 }
 
 void fill_differences(const Evaluation& here, const Evaluation& there, double step, Eigen::Index column,
@@ -381,8 +398,8 @@ Fit fit(const TransitionModel& model, const std::vector<double>& nuisance, const
   if (!finite) result.reason = "its likelihood is not finite";
   for (int iteration = 0;
        finite && iteration < options.most_iterations + static_cast<int>(reach) && !point.slots().empty(); ++iteration) {
-    result.derivatives =
-        iteration == 0 && options.derivatives ? *options.derivatives : differences(point, result.evaluation, reach);
+    result.derivatives = iteration == 0 && options.derivatives ? *options.derivatives
+                                                               : differences(model, point, result.evaluation, reach);
     result.information = information(result.derivatives, result.evaluation, weights);
     result.gradient = penalised_gradient(point.slots(), weights, result);
     const FreeParts parts = free_parts(point.slots(), result.gradient, result.information);

@@ -86,7 +86,7 @@ RankedCause weighed_effect(const RankingProblem& problem, const SingleEffects& s
 void fit_all(const RankingProblem& problem, SingleEffects& singles) {
   double largest = 0;
   for (const ScannedEffect& effect : singles.scan.effects) largest = std::max(largest, effect.gain[effect.best]);
-  markov::parallel_for(problem.candidates.size(), problem.threads, [&](std::size_t i) {
+  problem.model.side_by_side(problem.candidates.size(), problem.threads, [&](std::size_t i) {
     problem.heartbeat();
     singles.causes[i] = weighed_effect(problem, singles, problem.candidates[i], largest);
   });
@@ -97,7 +97,7 @@ void fit_overlooked(const RankingProblem& problem, SingleEffects& singles) {
   double best = 0;
   for (const RankedCause& cause : singles.causes)
     if (cause.fitted()) best = std::max(best, cause.evidence);
-  markov::parallel_for(singles.causes.size(), problem.threads, [&](std::size_t i) {
+  problem.model.side_by_side(singles.causes.size(), problem.threads, [&](std::size_t i) {
     problem.heartbeat();
     RankedCause& cause = singles.causes[i];
     if (cause.candidate_undecided() || cause.fitted() || cause.evidence < std::max(0.0, best - overlooked_margin))
@@ -117,7 +117,7 @@ bool near_the_top(const SingleEffects& singles, const RankedCause& cause, double
 // strained: fits start from the stated nuisances, too.
 void refit_from_stated(const RankingProblem& problem, SingleEffects& singles) {
   const std::vector<double> stated = nominal_values(problem.model);
-  markov::parallel_for(singles.causes.size(), problem.threads, [&](std::size_t i) {
+  problem.model.side_by_side(singles.causes.size(), problem.threads, [&](std::size_t i) {
     problem.heartbeat();
     RankedCause& cause = singles.causes[i];
     if (!cause.fitted() || cause.terms[0].candidate->parameters.empty() ||
@@ -136,7 +136,7 @@ void refit_unconverged(const RankingProblem& problem, SingleEffects& singles) {
   if (singles.causes.empty()) return;
   const auto best = std::ranges::max_element(singles.causes, {}, &RankedCause::evidence);
   const std::vector<double> leaders_nuisance = best->fit.nuisance;
-  markov::parallel_for(singles.causes.size(), problem.threads, [&](std::size_t i) {
+  problem.model.side_by_side(singles.causes.size(), problem.threads, [&](std::size_t i) {
     problem.heartbeat();
     const RankedCause& cause = singles.causes[i];
     if (cause.fit.converged || !cause.fitted() || leaders_nuisance.empty() ||
@@ -204,7 +204,7 @@ std::vector<std::size_t> strongest(const RankingProblem& problem, const SingleEf
 void refine_leaders(const RankingProblem& problem, SingleEffects& singles) {
   const std::vector<std::size_t> leaders =
       strongest(problem, singles, [](const RankedCause& cause) { return !cause.terms[0].candidate->refine.empty(); });
-  markov::parallel_for(leaders.size(), problem.threads, [&](std::size_t k) {
+  problem.model.side_by_side(leaders.size(), problem.threads, [&](std::size_t k) {
     problem.heartbeat();
     if (near_the_top(singles, singles.causes[leaders[k]], refined_share)) refine_effect(problem, singles, leaders[k]);
   });

@@ -6,6 +6,8 @@
 #include <string>
 #include <utility>
 
+#include "markov/parallel.h"
+
 namespace metastable::analysis {
 
 double Nuisance::cost(double value) const {
@@ -37,6 +39,10 @@ EffectTerm term_of(const Candidate& candidate, const std::vector<double>& catalo
   FittedForm form = candidate.form_of ? candidate.form_of(catalogue_values)
                                       : FittedForm{candidate.variants.front(), catalogue_values};
   return {&candidate, std::move(form.variant), std::move(form.values)};
+}
+
+void TransitionModel::side_by_side(std::size_t count, int threads, const std::function<void(std::size_t)>& work) const {
+  markov::parallel_for(count, threads, work);
 }
 
 std::optional<Addition> TransitionModel::addition(const EffectTerm&, std::size_t) const { return std::nullopt; }

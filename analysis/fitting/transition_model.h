@@ -203,6 +203,9 @@ class TransitionModel {
   /// Gives the densities with these nuisances and effects. Values outside a model's reach give a very small density,
   /// never a NaN.
   virtual Evaluation evaluate(std::span<const double> nuisance, std::span<const EffectTerm> terms) const = 0;
+  /// Calls work(i), which evaluates hypotheses, once for every i in [0, count). The default is markov::parallel_for();
+  /// a model whose simulator costs much a call may join the calls of all works. Answers do not depend on it.
+  virtual void side_by_side(std::size_t count, int threads, const std::function<void(std::size_t)>& work) const;
   /// Counts the transitions of each trial. Event::number is that of its transition in the trial, from 1. The default is
   /// none: the model has no additions.
   virtual std::vector<std::size_t> transitions() const { return {}; }

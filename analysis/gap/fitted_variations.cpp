@@ -66,7 +66,7 @@ std::vector<LeftInFacet> fitted_variations(const TransitionModel& model, const F
   std::size_t fitted = 0;
   while (fitted < std::min(effort.most_leaders, order.size()) && all[order[fitted]].evidence > least) ++fitted;
   const std::function<void()> beat = markov::one_at_a_time(heartbeat);
-  markov::parallel_for(fitted, threads, [&](std::size_t k) {
+  model.side_by_side(fitted, threads, [&](std::size_t k) {
     beat();
     const ScannedEffect& scanned = scan.effects[order[k]];
     const Fit best = fit_one_more(model, effort, recalibrated, scanned, true);

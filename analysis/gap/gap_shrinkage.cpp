@@ -214,7 +214,7 @@ HeldOutGap gap_shrinkage(const TransitionModel& model, const Fit& given, const F
   const std::vector<int> fold = folds_of_trials(trials, folds, seed);
   std::vector<HeldOut> held(trials);
   const std::function<void()> beat = markov::one_at_a_time(heartbeat);
-  markov::parallel_for(static_cast<std::size_t>(folds), threads, [&](std::size_t f) {
+  model.side_by_side(static_cast<std::size_t>(folds), threads, [&](std::size_t f) {
     beat();
     FitOptions options;
     options.count.resize(trials);

@@ -62,7 +62,7 @@ std::vector<ClosedShare> parts_closed(const TransitionModel& model, const Fit& r
   const std::vector<int> fold = folds_of_trials(trials, folds, seed);
   std::vector<std::vector<double>> score(fits.size(), std::vector<double>(trials));
   const std::function<void()> beat = markov::one_at_a_time(heartbeat);
-  markov::parallel_for(fits.size() * static_cast<std::size_t>(folds), threads, [&](std::size_t task) {
+  model.side_by_side(fits.size() * static_cast<std::size_t>(folds), threads, [&](std::size_t task) {
     beat();
     const std::size_t k = task / static_cast<std::size_t>(folds);
     const auto f = static_cast<int>(task % static_cast<std::size_t>(folds));

@@ -5,14 +5,20 @@
 
 #include <algorithm>
 #include <cmath>
+#include <functional>
 #include <set>
 #include <stdexcept>
+#include <utility>
+
+#include "markov/mesh/joined_steps.h"
 
 namespace metastable::analysis {
 namespace {
 
 constexpr std::size_t most_states = 30;
 constexpr int most_scores = 16;
+constexpr std::size_t most_works = 8;  // works whose steps are joined: more of them hold more memory and save little
+thread_local const markov::BatchMap* joined = nullptr;  // of the work that runs on this thread; nullptr: none
 
 void require_finite(const std::string& what, double value) {
   if (!std::isfinite(value)) throw std::invalid_argument(fmt::format("{}: {} is not a finite number", what, value));
@@ -108,6 +114,72 @@ void Machine::require_valid() const {
   }
   if (!(most_wild >= 0 && most_wild <= 0.2))
     throw std::invalid_argument(fmt::format("most_wild: {} is outside [0, 0.2]", most_wild));
+}
+
+namespace {
+
+// The machine's map as joint calls take it: the values of a row follow its scores.
+markov::BatchMap joint_map(const Machine& machine) {
+  const std::size_t values = machine.value_names().size(), scores = static_cast<std::size_t>(machine.scores);
+  markov::BatchMap map;
+  map.dimension = static_cast<int>(machine.states.size());
+  map.scores = static_cast<int>(scores + values);
+  map.step = [&machine, values, scores](int, auto states, auto given, auto next, auto failed) {
+    const std::size_t rows = failed.size();
+    std::vector<double> own;
+    std::vector<std::vector<double>> by_value(values);
+    for (std::size_t row = 0; row < rows; ++row) {
+      const double* here = given.data() + row * (scores + values);
+      own.insert(own.end(), here, here + scores);
+      for (std::size_t v = 0; v < values; ++v) by_value[v].push_back(here[scores + v]);
+    }
+    for (std::vector<double>& one : by_value)
+      if (std::ranges::adjacent_find(one, std::not_equal_to()) == one.end()) one.resize(1);
+    const std::vector<std::span<const double>> spans(by_value.begin(), by_value.end());
+    machine.step({rows, states, own, spans, next, failed});
+  };
+  return map;
+}
+
+void step_jointly(const MachineBatch& batch) {
+  const std::size_t scores = batch.scores.size() / batch.rows;
+  std::vector<double> given;
+  for (std::size_t row = 0; row < batch.rows; ++row) {
+    const auto own = batch.scores.subspan(row * scores, scores);
+    given.insert(given.end(), own.begin(), own.end());
+    for (std::size_t v = 0; v < batch.values.size(); ++v) given.push_back(batch.value(v, row));
+  }
+  joined->step(0, batch.states, given, batch.next, batch.failed);
+}
+
+}  // namespace
+
+Machine joining_steps(std::shared_ptr<const Machine> machine) {
+  Machine all = *machine;
+  all.step = [machine = std::move(machine)](const MachineBatch& batch) {
+    if (batch.rows > 0 && joined)
+      step_jointly(batch);
+    else
+      machine->step(batch);
+  };
+  return all;
+}
+
+void side_by_side(const Machine& machine, std::size_t count, int threads,
+                  const std::function<void(std::size_t)>& work) {
+  if (joined || count < 2) {
+    for (std::size_t i = 0; i < count; ++i) work(i);
+    return;
+  }
+  markov::joined_for(joint_map(machine), count, most_works, threads, [&](std::size_t i, const markov::BatchMap& map) {
+    struct Joined {
+      explicit Joined(const markov::BatchMap& map) { joined = &map; }
+      ~Joined() { joined = nullptr; }
+      Joined(const Joined&) = delete;
+      Joined& operator=(const Joined&) = delete;
+    } const here(map);
+    work(i);
+  });
 }
 
 }  // namespace metastable::analysis

@@ -6,6 +6,7 @@
 #include <cstdint>
 #include <functional>
 #include <limits>
+#include <memory>
 #include <optional>
 #include <span>
 #include <string>
@@ -83,6 +84,8 @@ struct Machine {
   std::vector<MachineSensor> observe;   ///< at least one
   std::vector<MachineLaunch> launches;  ///< of states that a first row may lack
   std::vector<std::string> inputs;      ///< recorded numbers that a step is given, by their columns' names
+  /// A call of `step` costs much more than a row, as where an interpreter runs it.
+  bool dear = false;
   double most_wild = 0.01;  ///< largest share of rows that may be wild (missed events, bad tracks), [0, 0.2]
 
   /// Names what MachineBatch::values holds, in order: parameters, the effects' parameters, inputs.
@@ -92,5 +95,15 @@ struct Machine {
   /// @throws std::invalid_argument naming the first thing that is wrong, and the range
   void require_valid() const;
 };
+
+/// Returns a machine whose steps are brought together while works run side_by_side().
+Machine joining_steps(std::shared_ptr<const Machine> machine);
+
+/// Calls work(i) once for every i in [0, count). What works ask a machine of joining_steps() goes to the map in joint
+/// calls (markov::joined_for()); a value that differs between the works is then one number a row. Works within works
+/// run one after the other.
+/// @param machine  the map, as joining_steps() was given it  @param threads  that compute at the same time; 0: all
+/// cores
+void side_by_side(const Machine& machine, std::size_t count, int threads, const std::function<void(std::size_t)>& work);
 
 }  // namespace metastable::analysis

@@ -54,16 +54,28 @@ struct Walking {
   bool over = false;
 };
 
+// The trials of all experiments, one experiment after the other.
+MachineRuns all_trials(std::span<const MachineRuns> experiments) {
+  MachineRuns all = experiments.front();
+  for (const MachineRuns& one : experiments.subspan(1))
+    all.trials.insert(all.trials.end(), one.trials.begin(), one.trials.end());
+  return all;
+}
+
+// Walks the trials of experiments that differ in their launches, all together.
 class Walker {
  public:
-  Walker(const Machine& machine, const MachineRuns& runs, const MachineHypothesis& supposed, std::uint64_t seed)
+  Walker(const Machine& machine, std::span<const MachineRuns> experiments, const MachineHypothesis& supposed,
+         std::span<const std::uint64_t> seeds)
       : machine_(machine),
-        runs_(runs),
+        runs_(all_trials(experiments)),
         supposed_(supposed),
-        seed_(seed),
-        stepper_(machine, runs_, supposed),
-        design_(machine_design(machine, runs)) {}
-  MachineRuns walk();
+        seeds_(seeds),
+        each_(experiments.front().trials.size()),
+        stepper_(machine, runs_, supposed) {
+    for (const MachineRuns& one : experiments) designs_.push_back(machine_design(machine, one));
+  }
+  std::vector<MachineRuns> walk();
 
  private:
   std::size_t planned(std::size_t trial) const;
@@ -71,13 +83,16 @@ class Walker {
   Walking launched(std::size_t trial) const;
   double error(std::size_t sensor, double now, double before) const;
   MachineRow seen(std::size_t trial, std::size_t row, Walking& walking) const;
+  std::vector<MachineRuns> apart(MachineRuns all) const;
+  Draws draws_of(std::size_t trial) const { return {seeds_[trial / each_], trial % each_}; }
 
   const Machine& machine_;
-  const MachineRuns& runs_;
+  MachineRuns runs_;
   const MachineHypothesis& supposed_;
-  std::uint64_t seed_;
+  std::span<const std::uint64_t> seeds_;  // by experiment
+  std::size_t each_;                      // trials of an experiment
   MachineStepper stepper_;
-  MachineDesign design_;
+  std::vector<MachineDesign> designs_;  // by experiment
 };
 
 std::size_t Walker::planned(std::size_t trial) const {
@@ -97,7 +112,7 @@ double Walker::error(std::size_t sensor, double now, double before) const {
 }
 
 Walking Walker::launched(std::size_t trial) const {
-  const Draws draws(seed_, trial);
+  const Draws draws = draws_of(trial);
   const MachineRow& row = runs_.trials[trial].rows.front();
   Walking walking{Eigen::VectorXd::Zero(static_cast<Eigen::Index>(stepper_.size())),
                   Eigen::VectorXd::Zero(static_cast<Eigen::Index>(machine_.observe.size())), false};
@@ -123,10 +138,11 @@ Walking Walker::launched(std::size_t trial) const {
 
 // The measured row: the state with its errors, and with the values missing that the design lacks.
 MachineRow Walker::seen(std::size_t trial, std::size_t row, Walking& walking) const {
-  const Draws draws(seed_, trial);
+  const Draws draws = draws_of(trial);
+  const MachineDesign& design = designs_[trial / each_];
   const std::size_t like = design_row(trial, row);
   MachineRow out = runs_.trials[trial].rows[like];
-  out.time += static_cast<double>(row - like) * design_.usual_gap;
+  out.time += static_cast<double>(row - like) * design.usual_gap;
   const bool is_wild = draws.uniform(row, wild) < supposed_.wild;
   for (std::size_t j = 0; j < machine_.observe.size(); ++j) {
     const auto at = static_cast<Eigen::Index>(j);
@@ -136,19 +152,20 @@ MachineRow Walker::seen(std::size_t trial, std::size_t row, Walking& walking) co
     double off = error(j, walking.errors[at], before);
     if (!supposed_.added_noise.empty()) off += supposed_.added_noise[j] * draws.normal(row, added + j);
     if (is_wild)
-      off = wild_width * std::hypot(design_.change[j], supposed_.sensor_sd[j]) * draws.normal(row, wild_error + j);
+      off = wild_width * std::hypot(design.change[j], supposed_.sensor_sd[j]) * draws.normal(row, wild_error + j);
     if (!supposed_.bias.empty()) off += supposed_.bias[j];
     out.seen[j] = walking.point[static_cast<Eigen::Index>(machine_.state_index(machine_.observe[j].state))] + off;
   }
   return out;
 }
 
-MachineRuns Walker::walk() {
+std::vector<MachineRuns> Walker::walk() {
   MachineRuns out = runs_;
   std::vector<Walking> walking;
   std::vector<std::size_t> first;
   std::size_t number = 0;
   for (std::size_t t = 0; t < runs_.trials.size(); ++t) {
+    if (t % each_ == 0) number = 0;
     first.push_back(number);
     number += steps_of(runs_.trials[t]);
     if (runs_.trials[t].rows.empty()) {
@@ -164,7 +181,7 @@ MachineRuns Walker::walk() {
     std::vector<std::size_t> who;
     for (std::size_t t = 0; t < walking.size(); ++t) {
       if (walking[t].over || k + 1 >= planned(t)) continue;
-      const Draws draws(seed_, t);
+      const Draws draws = draws_of(t);
       Eigen::VectorXd fresh(static_cast<Eigen::Index>(stepper_.scores()));
       const double width = draws.uniform(k + 1, outlier) < supposed_.outliers ? outlier_width : 1;
       for (std::size_t m = 0; m < stepper_.scores(); ++m)
@@ -191,7 +208,15 @@ MachineRuns Walker::walk() {
       out.trials[who[i]].rows.push_back(seen(who[i], k + 1, one));
     }
   }
-  return out;
+  return apart(std::move(out));
+}
+
+std::vector<MachineRuns> Walker::apart(MachineRuns all) const {
+  std::vector<MachineTrial> trials;
+  trials.swap(all.trials);
+  std::vector<MachineRuns> experiments(seeds_.size(), all);
+  for (std::size_t t = 0; t < trials.size(); ++t) experiments[t / each_].trials.push_back(std::move(trials[t]));
+  return experiments;
 }
 
 // Trials of one design: their first rows hold the same columns, at least one.
@@ -273,7 +298,12 @@ MachineRuns redrawn_launches(const MachineRuns& runs, std::uint64_t seed) {
 
 MachineRuns simulate_machine(const Machine& machine, const MachineRuns& runs, const MachineHypothesis& supposed,
                              std::uint64_t seed) {
-  return Walker(machine, runs, supposed, seed).walk();
+  return std::move(simulate_machines(machine, {&runs, 1}, supposed, {&seed, 1}).front());
+}
+
+std::vector<MachineRuns> simulate_machines(const Machine& machine, std::span<const MachineRuns> experiments,
+                                           const MachineHypothesis& supposed, std::span<const std::uint64_t> seeds) {
+  return Walker(machine, experiments, supposed, seeds).walk();
 }
 
 }  // namespace metastable::analysis

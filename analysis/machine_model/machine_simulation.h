@@ -14,6 +14,11 @@ namespace metastable::analysis {
 /// data.
 MachineRuns simulate_machine(const Machine& machine, const MachineRuns& runs, const MachineHypothesis& supposed,
                              std::uint64_t seed);
+/// Draws several experiments, each as simulate_machine() does by its seed; the map is called once a step number for
+/// all.
+/// @param experiments  at least one: the same design, launches apart
+std::vector<MachineRuns> simulate_machines(const Machine& machine, std::span<const MachineRuns> experiments,
+                                           const MachineHypothesis& supposed, std::span<const std::uint64_t> seeds);
 
 /// Draws first rows anew, as likely as the measured ones of trials with the same condition, phase, labels and columns:
 /// from their smoothed distribution (SmoothSample), of which the errors of the sensors are no part once

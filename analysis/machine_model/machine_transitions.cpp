@@ -29,6 +29,7 @@ constexpr double seen_share = 1e-6;      // of a column's change, that its noise
 // Steps that are drawn for the expected steps, and failures that end them: 6 % of error. Below a few failures they say
 // next to nothing.
 constexpr double enough_steps = 30000, enough_failures = 300, few_failures = 10;
+constexpr double most_experiments = 64;  // experiments whose trials are walked at once
 constexpr std::uint64_t seeds_apart = 0x9E3779B97F4A7C15;
 
 double share_of(double logit) { return 1 / (1 + std::exp(-logit)); }
@@ -36,7 +37,9 @@ double share_of(double logit) { return 1 / (1 + std::exp(-logit)); }
 class MachineTransitions : public TransitionModel {
  public:
   MachineTransitions(std::shared_ptr<const Machine> machine, MachineRuns runs)
-      : machine_(std::move(machine)), runs_(std::move(runs)) {
+      : map_(machine),
+        machine_(machine->dear ? std::make_shared<Machine>(joining_steps(machine)) : machine),
+        runs_(std::move(runs)) {
     notes_ = look_over(*machine_, runs_);
     design_ = std::make_shared<MachineDesign>(machine_design(*machine_, runs_));
     set_up_nuisances();
@@ -46,7 +49,7 @@ class MachineTransitions : public TransitionModel {
     set_up_effects();
     list_events();
     require_noise();
-    starts_ = std::make_shared<TolerantStarts>(machine_, runs_);
+    starts_ = std::make_shared<TolerantStarts>(map_, runs_);
   }
 
   const std::vector<Event>& events() const override { return events_; }
@@ -72,6 +75,11 @@ class MachineTransitions : public TransitionModel {
   }
   Evaluation evaluate(std::span<const double> nuisance, std::span<const EffectTerm> terms) const override {
     return follow_machine(*machine_, runs_, plan_, events_, hypothesis(nuisance, terms));
+  }
+  void side_by_side(std::size_t count, int threads, const std::function<void(std::size_t)>& work) const override {
+    if (!machine_->dear) return TransitionModel::side_by_side(count, threads, work);
+    starts_->prepare();  // No work may wait for another one to do it: joint calls wait for all works.
+    analysis::side_by_side(*map_, count, threads, work);
   }
   std::vector<std::size_t> transitions() const override {
     std::vector<std::size_t> all;
@@ -135,7 +143,8 @@ class MachineTransitions : public TransitionModel {
   void list_events() { events_ = machine_events(*machine_, runs_, plan_); }
   void require_noise() const;
 
-  std::shared_ptr<const Machine> machine_;
+  std::shared_ptr<const Machine> map_;      // as its user gave it
+  std::shared_ptr<const Machine> machine_;  // where calls are dear, it joins them
   MachineRuns runs_;
   std::shared_ptr<const MachineDesign> design_;
   ScorePlan plan_;
@@ -244,7 +253,7 @@ std::unique_ptr<MachineTransitions> MachineTransitions::drawn(const MachineRuns&
   copy->variations_.clear();
   copy->set_up_effects();
   copy->list_events();
-  copy->starts_ = std::make_shared<TolerantStarts>(machine_, copy->runs_);
+  copy->starts_ = std::make_shared<TolerantStarts>(map_, copy->runs_);
   return copy;
 }
 
@@ -255,13 +264,26 @@ double MachineTransitions::expected_steps(std::span<const double> nuisance, std:
                                           std::uint64_t seed) const {
   const MachineHypothesis supposed = hypothesis(nuisance, terms);
   double steps = 0, failed = 0;
-  for (std::uint64_t again = 0; steps < enough_steps && failed < enough_failures; ++again) {
-    const std::uint64_t now = seed + again * seeds_apart;
-    const MachineRuns launched = smoothed_launches(runs_, supposed, now);
-    const MachineRuns drawn = simulate_machine(*machine_, launched, supposed, now);
-    for (const MachineTrial& trial : drawn.trials) {
-      steps += static_cast<double>(steps_of(trial));
-      failed += trial.outcome == MachineOutcome::failed;
+  std::uint64_t drawn_so_far = 0;
+  const auto enough = [&] { return steps >= enough_steps || failed >= enough_failures; };
+  while (!enough()) {
+    // The first experiment tells how many there will be. Those are walked together, so that the map is called less
+    // often.
+    const double share = std::max(steps / enough_steps, failed / enough_failures);
+    const auto so_far = static_cast<double>(drawn_so_far);
+    const double more = drawn_so_far == 0 ? 1 : std::clamp(std::ceil(so_far / share) - so_far, 1.0, most_experiments);
+    std::vector<MachineRuns> launched;
+    std::vector<std::uint64_t> seeds;
+    for (std::size_t i = 0; i < static_cast<std::size_t>(more); ++i, ++drawn_so_far) {
+      seeds.push_back(seed + drawn_so_far * seeds_apart);
+      launched.push_back(smoothed_launches(runs_, supposed, seeds.back()));
+    }
+    for (const MachineRuns& drawn : simulate_machines(*machine_, launched, supposed, seeds)) {
+      if (enough()) break;
+      for (const MachineTrial& trial : drawn.trials) {
+        steps += static_cast<double>(steps_of(trial));
+        failed += trial.outcome == MachineOutcome::failed;
+      }
     }
   }
   double rate = failed / steps;

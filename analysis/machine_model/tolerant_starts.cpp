@@ -54,8 +54,12 @@ std::unique_ptr<TolerantStarts::Tolerant> TolerantStarts::tolerant() const {
   return found;
 }
 
-std::vector<FitStart> TolerantStarts::starts(std::span<const EffectTerm> terms) const {
+void TolerantStarts::prepare() const {
   std::call_once(asked_, [this] { tolerant_ = tolerant(); });
+}
+
+std::vector<FitStart> TolerantStarts::starts(std::span<const EffectTerm> terms) const {
+  prepare();
   if (!tolerant_) return {};
   const TransitionModel& model = *tolerant_->model;
   std::vector<EffectTerm> same;

@@ -23,6 +23,8 @@ class TolerantStarts {
   /// wild rows or no sensor of known error, and for one effect that promises far less than another. May be called from
   /// several threads.
   std::vector<FitStart> starts(std::span<const EffectTerm> terms) const;
+  /// Fits the tolerant model, once, if it is needed: the first call of starts() does it, too.
+  void prepare() const;
 
  private:
   struct Tolerant {

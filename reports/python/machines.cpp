@@ -146,6 +146,7 @@ py::dict diagnose_machine(const py::dict& machine_fields, const py::dict& runs_f
   Call call(progress);
   std::vector<std::string> figures;
   const std::vector<std::string> names = machine->value_names();
+  machine->dear = true;
   machine->step = [&](const analysis::MachineBatch& batch) {
     if (batch.rows > 0) call.ask([&] { ask_step(step, names, batch); });
   };

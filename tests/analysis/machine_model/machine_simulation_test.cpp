@@ -79,5 +79,28 @@ TEST(MachineSimulation, EveryEffectHasALikelihood) {
   for (const MachineVariation& one : machine_variations(machine, design)) check(one, one.variation.candidate);
 }
 
+TEST(MachineSimulation, ExperimentsDrawnTogetherAreThoseDrawnAlone) {
+  const Machine machine = linear_machine(0.1, -0.5);
+  const MachineRuns runs = measured();
+  MachineHypothesis h = nominal_of(machine);
+  h.memory = {0.4};
+  h.changes = {{1, std::vector<double>(runs.trials.size() * 25, 0.0)}};
+  for (std::size_t i = 0; i < h.changes[0].transition.size(); i += 3) h.changes[0].transition[i] = 0.5;
+  const std::vector<std::uint64_t> seeds{9, 10, 31};
+  std::vector<MachineRuns> launched;
+  for (const std::uint64_t seed : seeds) launched.push_back(smoothed_launches(runs, h, seed));
+  const std::vector<MachineRuns> together = simulate_machines(machine, launched, h, seeds);
+  ASSERT_EQ(together.size(), 3u);
+  for (std::size_t i = 0; i < 3; ++i) {
+    const MachineRuns alone = simulate_machine(machine, launched[i], h, seeds[i]);
+    ASSERT_EQ(together[i].trials.size(), alone.trials.size());
+    for (std::size_t t = 0; t < alone.trials.size(); ++t) {
+      ASSERT_EQ(together[i].trials[t].rows.size(), alone.trials[t].rows.size());
+      for (std::size_t k = 0; k < alone.trials[t].rows.size(); ++k)
+        EXPECT_EQ(together[i].trials[t].rows[k].seen, alone.trials[t].rows[k].seen) << i << " " << t << " " << k;
+    }
+  }
+}
+
 }  // namespace
 }  // namespace metastable::analysis::test
