@@ -37,9 +37,13 @@ Fit drawn_fit(const TransitionModel& model, const Fit& fit, std::uint64_t seed, 
   drawn.terms = fit.terms;
   if (!has_information(fit)) return drawn;
   Eigen::MatrixXd covariance = markov::floored_inverse(fit.information, resolved_share);
+  // An error of form moves a parameter, and the fit moves the others with it.
+  const Eigen::MatrixXd by_data = covariance;
   for (std::size_t p = 0; p < fit.nuisance.size(); ++p) {
-    const double form = model.nuisances()[p].form_sd;
-    covariance(static_cast<Eigen::Index>(p), static_cast<Eigen::Index>(p)) += form * form;
+    const auto at = static_cast<Eigen::Index>(p);
+    if (!(model.nuisances()[p].form_sd > 0 && by_data(at, at) > 0)) continue;
+    const Eigen::VectorXd moved = model.nuisances()[p].form_sd / by_data(at, at) * by_data.col(at);
+    covariance += moved * moved.transpose();
   }
   const markov::SymmetricEigen split = markov::symmetric_eigen(covariance);
   const std::vector<double> normals =

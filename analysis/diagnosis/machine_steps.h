@@ -27,8 +27,8 @@ using Elsewhere = std::pair<std::string, std::unique_ptr<TransitionModel>>;
 void set_observed(StepsBeforeFailure& steps, std::pair<double, double> rests);
 
 /// Draws the expected steps that a mixture of fits leaves open: parameters from the normal distribution that their
-/// information has, launches that so many trials leave possible, and each draw's own simulation. Infinite where a draw
-/// never rests.
+/// information has, widened where an error of the model's form moves one of them and the fit the others with it,
+/// launches that so many trials leave possible, and each draw's own simulation. Infinite where a draw never rests.
 /// @param at  the experiment that is asked about, of the same parameters as the fits
 /// @param draws  >= 1
 std::vector<double> drawn_steps(const TransitionModel& model, const TransitionModel& at,

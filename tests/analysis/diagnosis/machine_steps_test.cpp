@@ -4,9 +4,13 @@
 
 #include <boost/math/distributions/gamma.hpp>
 #include <cmath>
+#include <functional>
 #include <limits>
 #include <stdexcept>
+#include <utility>
 #include <vector>
+
+#include "tests/analysis/line.h"
 
 namespace metastable::analysis {
 namespace {
@@ -19,6 +23,42 @@ std::vector<double> lognormal(double median, double sd) {
   for (const double z : {-1.645, -1.036, -0.674, -0.385, -0.126, 0.126, 0.385, 0.674, 1.036, 1.645})
     draws.push_back(median * std::exp(sd * z));
   return draws;
+}
+
+// The data tell the sum of two parameters and hardly the first, which errors of form move.
+class Ridge : public test::Line {
+ public:
+  explicit Ridge(std::function<double(double, double)> log_steps)
+      : Line(test::line(0, 1, 8)), log_steps_(std::move(log_steps)) {
+    nuisances_ = {{"first", 0, 1e3, 1e-4, -1e3, 1e3}, {"second", 0, 1e3, 1e-4, -1e3, 1e3}};
+    nuisances_[0].form_sd = 3;
+  }
+  double expected_steps(std::span<const double> n, std::span<const EffectTerm>, std::uint64_t) const override {
+    return std::exp(log_steps_(n[0], n[1]));
+  }
+
+ private:
+  std::function<double(double, double)> log_steps_;
+};
+
+// Returns the standard deviation of the logarithm of the steps that a fit to such data leaves open.
+double drawn_sd(std::function<double(double, double)> log_steps) {
+  const Ridge model(std::move(log_steps));
+  Fit fit;
+  fit.nuisance = {0, 0};
+  fit.information = Eigen::Matrix2d{{1e4 + 1, 1e4}, {1e4, 1e4 + 1}};
+  double sum = 0, squares = 0;
+  constexpr int draws = 400;
+  for (const double steps : drawn_steps(model, model, {{&fit, 1}}, draws, 1, 1, [] {})) {
+    sum += std::log(steps);
+    squares += std::log(steps) * std::log(steps);
+  }
+  return std::sqrt(squares / draws - sum * sum / draws / draws);
+}
+
+TEST(MachineSteps, ErrorsOfFormMoveWhatTheDataLeaveOpen) {
+  EXPECT_LT(drawn_sd([](double first, double second) { return first + second; }), 0.02);  // 0.01 by the data
+  EXPECT_NEAR(drawn_sd([](double first, double) { return first; }), std::sqrt(9.5), 0.5);
 }
 
 TEST(MachineSteps, ObservedLimitsAreThoseOfAPoissonMean) {
