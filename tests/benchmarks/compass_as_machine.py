@@ -136,7 +136,10 @@ def main():
         name, _, value = entry.partition("=")
         if name not in GAPS:
             parser.error(f"--gap: {name} is none of {', '.join(GAPS)}")
-        values[name] = float(value)
+        try:
+            values[name] = float(value)
+        except ValueError:
+            parser.error(f"--gap: {name}: '{value}' is no number")
     machine = metastable.machine(
         step, states=list(SENSOR), noise=1, name="a compass gait",
         parameters={"slope": (0.05236, 0.003), "scatter": (0.004, 0.002, 0.0003, 0.03), "leg_mass": (LEG, 0.05, 3, 7)},
