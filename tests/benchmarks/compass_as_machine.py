@@ -127,10 +127,6 @@ def main():
     parser.add_argument("--python", help="folder of the module, build/release/reports/python")
     parser.add_argument("--gap", action="append", default=[], metavar="NAME=VALUE", help=f"one of {', '.join(GAPS)}")
     options = parser.parse_args()
-    if options.python:
-        sys.path.insert(0, options.python)
-    import metastable
-
     values = dict(GAPS)
     for entry in options.gap:
         name, _, value = entry.partition("=")
@@ -140,6 +136,10 @@ def main():
             values[name] = float(value)
         except ValueError:
             parser.error(f"--gap: {name}: '{value}' is no number")
+    if options.python:
+        sys.path.insert(0, options.python)
+    import metastable
+
     machine = metastable.machine(
         step, states=list(SENSOR), noise=1, name="a compass gait",
         parameters={"slope": (0.05236, 0.003), "scatter": (0.004, 0.002, 0.0003, 0.03), "leg_mass": (LEG, 0.05, 3, 7)},
