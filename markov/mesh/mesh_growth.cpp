@@ -261,6 +261,7 @@ double MeshGrowth::add_lines(std::uint32_t node, Lines& lines) const {
   const int phase = NodeLattice::phase(key_[node]);
   double outside = 0;
   const auto add = [&](std::span<const double> state, std::span<const double> others, double weight, double reach) {
+    const double others_action = 0.5 * std::inner_product(others.begin(), others.end(), others.begin(), 0.0);
     if (map_.inside && !map_.inside(phase, state)) {
       outside += weight;
       return;
@@ -268,6 +269,7 @@ double MeshGrowth::add_lines(std::uint32_t node, Lines& lines) const {
     lines.along.states.insert(lines.along.states.end(), state.begin(), state.end());
     lines.along.others.insert(lines.along.others.end(), others.begin(), others.end());
     lines.along.reach.push_back(reach);
+    lines.along.beyond.push_back(action_[node] + others_action - cheapest_failure_);
     lines.weight.push_back(weight);
   };
   lines.first.push_back(lines.weight.size());

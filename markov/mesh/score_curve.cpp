@@ -10,12 +10,14 @@
 namespace metastable::markov {
 namespace {
 
-constexpr double narrowest_gap = 1.0 / 512;  // of the spacing: gaps are halved so far, to find where failures begin
-constexpr std::size_t most_places = 6;       // that a polynomial goes through
-constexpr double foretold = 2e-3;            // stationary sds: what a gap's middle may lie off before it was stepped;
-                                             // afterwards a sixty-fourth is left
-constexpr double extrapolated = 10;          // times that, where a polynomial had to look beyond its places
-constexpr int foreseen = 2;                  // further halvings of a gap that a dear map is asked for ahead
+constexpr double narrowest_gap_share =
+    1.0 / 512;                            // of the spacing: gaps are halved so far, to find where failures begin
+constexpr double widest_gap_share = 0.5;  // of the spacing: so far all gaps are halved in which they do
+constexpr std::size_t most_places = 6;    // that a polynomial goes through
+constexpr double foretold = 2e-3;         // stationary sds: what a gap's middle may lie off before it was stepped;
+                                          // afterwards a sixty-fourth is left
+constexpr double extrapolated = 10;       // times that, where a polynomial had to look beyond its places
+constexpr int foreseen = 2;               // further halvings of a gap that a dear map is asked for ahead
 constexpr double per_cell = 2,
                  pair_limit = 1024;  // pairs of Gauss's points a cell of the lattice, and between two places
 
@@ -140,10 +142,17 @@ void share_along(const PlacePolynomial& curve, double low, double high, double c
 
 }  // namespace
 
-ScoreCurve::ScoreCurve(double spacing, double reach) : narrowest_(spacing * narrowest_gap) {
+ScoreCurve::ScoreCurve(double spacing, double reach, double beyond) : spacing_(spacing), beyond_(beyond) {
   // The first places stand twice as far apart: what lies between them shows how far the curve can be trusted.
   const double gaps = std::max(2.0, std::ceil(reach / spacing));
   for (double i = 0; i <= gaps; i += 1) asked_.push_back(reach * (2 * i / gaps - 1));
+}
+
+/// Returns the width of a gap that is not halved any more.
+double ScoreCurve::narrowest_gap(double score) const {
+  // The error of a share grows with the square of the width, and the share counts by exp(-rarer).
+  const double rarer = std::max(0.0, beyond_ + 0.5 * score * score);
+  return spacing_ * std::min(widest_gap_share, narrowest_gap_share * std::exp(0.5 * rarer));
 }
 
 bool ScoreCurve::joined(std::size_t left) const {
@@ -166,7 +175,7 @@ std::span<const ScoreCurve::Place> ScoreCurve::stencil(std::size_t left, std::si
 
 /// Decides which halves of the gap after place `at` are to be halved again.
 void ScoreCurve::halve(Place& left, Place& middle, const Place& right, std::size_t at, double unit) const {
-  const bool more = middle.score - left.score > narrowest_;
+  const bool more = middle.score - left.score > narrowest_gap(middle.score);
   const auto lands = [](const Place& place) { return place.landing.fate == Fate::lands; };
   const auto off = [&](std::size_t from, std::size_t to) {
     return unit * distance(PlacePolynomial(stencil(from, to))(middle.score), middle.landing.at);
@@ -380,7 +389,9 @@ class Following {
 std::vector<ScoreCurve> follow_curves(const BatchMap& map, const NodeLattice& lattice, int phase,
                                       const ScoreLines& lines, double spacing, double unit) {
   std::vector<ScoreCurve> curves;
-  for (const double far : lines.reach) curves.emplace_back(spacing, far);
+  for (std::size_t n = 0; n < lines.reach.size(); ++n)
+    lines.beyond.empty() ? curves.emplace_back(spacing, lines.reach[n])
+                         : curves.emplace_back(spacing, lines.reach[n], lines.beyond[n]);
   Following following(map, lattice, phase, lines, unit);
   map.dear ? following.follow_ahead(curves) : following.follow(curves);
   return curves;

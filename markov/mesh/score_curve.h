@@ -2,6 +2,7 @@
 // Reads where a state leads as a smooth curve in the one score of its noise: a few steps of the map, interpolated.
 
 #include <cstdint>
+#include <limits>
 #include <optional>
 #include <span>
 #include <utility>
@@ -30,7 +31,9 @@ class ScoreCurve {
   /// @param spacing  > 0: between places where the curve is smooth
   /// @param reach    > 0: scores beyond, of either sign, are not looked at; they fail where the last place does, or
   ///                 else leave
-  ScoreCurve(double spacing, double reach);
+  /// @param beyond   the state's action less that of the cheapest failure: where failures begin is found the less
+  ///                 closely, the rarer it makes them
+  ScoreCurve(double spacing, double reach, double beyond = -std::numeric_limits<double>::infinity());
 
   /// Returns the scores to be stepped next, ascending; none when the curve is known.
   const std::vector<double>& asked() const { return asked_; }
@@ -58,10 +61,11 @@ class ScoreCurve {
     bool torn = false;  ///< the curve jumps in it
   };
   bool joined(std::size_t left) const;
+  double narrowest_gap(double score) const;
   std::span<const Place> stencil(std::size_t left, std::size_t right) const;
   void halve(Place& left, Place& middle, const Place& right, std::size_t at, double unit) const;
 
-  double narrowest_;
+  double spacing_, beyond_;
   std::vector<Place> place_;
   std::vector<double> asked_;
 };
@@ -71,6 +75,7 @@ struct ScoreLines {
   std::vector<double> states;  ///< in rows of the map's dimension
   std::vector<double> others;  ///< the scores but the first, in rows of map.scores - 1
   std::vector<double> reach;   ///< of the first score
+  std::vector<double> beyond;  ///< as ScoreCurve's; empty: all are looked at closely
 };
 
 /// Follows the curves along lines of one phase together: the map is asked for many steps at once, and a dear one for

@@ -44,7 +44,7 @@ Shared share(double (*to)(double), double spacing, double reach = 8.5) {
   Shared shared;
   const BatchMap map = landing(to, shared.steps);
   std::vector<std::pair<std::uint64_t, double>> parts;
-  shared.shares = follow_curves(map, lattice, 0, {{0}, {}, {reach}}, 0.8, spacing).front().share(lattice, 0, 1, parts);
+  shared.shares = follow_curves(map, lattice, 0, {{0}, {}, {reach}, {}}, 0.8, spacing).front().share(lattice, 0, 1, parts);
   for (const auto& [key, mass] : parts) shared.at[lattice.state(key)[0]] += mass;
   return shared;
 }
