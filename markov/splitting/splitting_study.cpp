@@ -9,11 +9,14 @@
 #include <cmath>
 #include <limits>
 #include <memory>
+#include <numeric>
+#include <span>
 #include <stdexcept>
 #include <utility>
 
 #include "markov/parallel.h"
 #include "markov/splitting/level_pilot.h"
+#include "markov/splitting/start_gait.h"
 
 namespace metastable::markov {
 namespace {
@@ -21,17 +24,38 @@ namespace {
 constexpr double fewest_lines = 30;
 constexpr double shortest_burn_in = 30;  // steps, as memory that is not linear is seen in part only
 constexpr double refused_level = 1e-3;
-constexpr std::size_t walks_of_a_round = 1000;            // that failed, whose last steps are kept
-constexpr double widest = 4;                              // upper over lower end of an interval that is given
-constexpr std::uint64_t most_attempts = 3;                // to learn levels that agree
+constexpr std::size_t walks_of_a_round = 1000;  // that failed, whose last steps are kept
+constexpr double widest = 4;                    // upper over lower end of an interval that is given
+constexpr double much_rarer = 7;                // ln 1000: slips into another gait a failure that bear on no number
+constexpr double met_when_heated = 6;           // action under larger noise of what some thousand steps meet for sure
+constexpr double settled_growth = 0.1;      // of the share in other gaits, from the burn-in to the end of the rounds
+constexpr std::uint64_t most_attempts = 3;  // to learn levels that agree
 constexpr std::uint64_t streams_of_an_attempt = 1 << 14;  // streams of random numbers that one attempt may use
 
 /// One independent ensemble and what was seen of it.
 struct Round {
   std::unique_ptr<WeightedEnsemble> ensemble;
-  std::vector<double> early;   ///< share that fails in each step of the burn-in
-  std::vector<double> shares;  ///< and after it
+  std::vector<double> early;            ///< share that fails in each step of the burn-in
+  std::vector<double> shares;           ///< and after it
+  std::vector<double> states, weights;  ///< at the end of the burn-in
 };
+
+/// Holds a number and its standard error.
+struct Measured {
+  double value = 0, standard_error = 0;
+};
+
+/// Takes the ratio of two means over rounds, with the jackknife's error.
+Measured ratio_of_means(std::span<const double> over, std::span<const double> under) {
+  const double n = static_cast<double>(over.size());
+  const double a = std::accumulate(over.begin(), over.end(), 0.0), b = std::accumulate(under.begin(), under.end(), 0.0);
+  double mean = 0, squares = 0;
+  std::vector<double> without;
+  for (std::size_t r = 0; r < over.size(); ++r) without.push_back((a - over[r]) / (b - under[r]));
+  for (const double one : without) mean += one / n;
+  for (const double one : without) squares += (one - mean) * (one - mean);
+  return {a / b, std::sqrt((n - 1) / n * squares)};
+}
 
 /// Holds what rounds say together.
 struct Pooled {
@@ -143,6 +167,8 @@ class Study {
           round.early.push_back(round.ensemble->advance());
           ++done, told();
         }
+        const auto states = round.ensemble->states(), weights = round.ensemble->weights();
+        round.states.assign(states.begin(), states.end()), round.weights.assign(weights.begin(), weights.end());
         if (options_.last_steps > 0) round.ensemble->remember(options_.last_steps, walks_of_a_round);
       }
       for (std::uint64_t n = 0; n < more && !round.ensemble->all_failed(); ++n) {
@@ -318,6 +344,79 @@ class Study {
       found_.disagreement =
           "splitting: rounds split by different levels find different failure rates: some ways to fail are not found "
           "by all";
+    else if (!found_.all_failed)
+      see_other_gaits();
+  }
+
+  /// Refuses where walks slip into another gait, and the share of those that have still grows: the rounds then say how
+  /// failures come from the start's gait, and not yet how from the other.
+  void see_other_gaits() {
+    StartGait gait(map_, start_, regime_sds());
+    if (gait.none()) return;
+    const auto slipped = [&](std::span<const double> states, std::span<const double> weights) {
+      const std::vector<std::uint8_t> left = gait.left(states);
+      double sum = 0;
+      for (std::size_t i = 0; i < left.size(); ++i) sum += left[i] ? weights[i] : 0;
+      return sum;
+    };
+    const auto slipped_by_now = [&](const Round& round) {
+      return slipped(round.ensemble->states(), round.ensemble->weights());
+    };
+    // One round of each level looks; the others are followed where it has found something. What is too rare for them is
+    // met under larger noise, which meets in some thousand steps what comes a thousand times more seldom than failure.
+    std::vector<double> before, after;
+    for (std::size_t r = 0; r < pilots_.size(); ++r) after.push_back(slipped_by_now(rounds_[r]));
+    const double heat = std::sqrt(std::max(1.0, (std::log(found_.steps.value) + much_rarer) / met_when_heated));
+    gait.left(gait.heated(start_, heat, options_.seed));
+    if (!gait.elsewhere().empty()) {
+      for (std::size_t r = pilots_.size(); r < rounds_.size(); ++r) after.push_back(slipped_by_now(rounds_[r]));
+      for (const Round& round : rounds_) before.push_back(slipped(round.states, round.weights));
+      judge_slips(before, after, describe_state(map_, gait.elsewhere()), heat);
+    }
+    calls_ += gait.calls();
+    found_.calls = calls_;
+  }
+
+  /// @param before, after  shares of each round at the end of the burn-in and of the round
+  void judge_slips(const std::vector<double>& before, const std::vector<double>& after, const std::string& where,
+                   double heat) {
+    const double first = mean_of(before), last = mean_of(after);
+    if (!(last > 0)) {
+      found_.disagreement = fmt::format(
+          "splitting: none of the walks has slipped into another gait, at {}, within {} steps, and under {:.2g} times "
+          "the noise some do: how failures come from there is not known",
+          where, found_.round_steps, heat);
+      return;
+    }
+    const Measured grown = ratio_of_means(after, before);
+    if (std::abs(grown.value - 1) + 2 * grown.standard_error < settled_growth) return;
+    found_.disagreement = fmt::format(
+        "splitting: of the walks {:.2g} % are in another gait, at {}, after {} steps, and {:.2g} % after {}: "
+        "these slip too seldom for rounds of such a length to tell how failures come from there",
+        100 * first, where, burn_in_, 100 * last, found_.round_steps);
+  }
+
+  static double mean_of(const std::vector<double>& all) {
+    return std::accumulate(all.begin(), all.end(), 0.0) / static_cast<double>(all.size());
+  }
+
+  /// Returns the sds of the numbers of a state at the end of the rounds.
+  std::vector<double> regime_sds() const {
+    const auto d = static_cast<std::size_t>(map_.dimension);
+    const auto mean_over_rounds = [&](const auto& of) {
+      std::vector<double> mean(d);
+      for (const Round& round : rounds_) {
+        const auto states = round.ensemble->states(), weights = round.ensemble->weights();
+        for (std::size_t i = 0; i < weights.size(); ++i)
+          for (std::size_t k = 0; k < d; ++k)
+            mean[k] += weights[i] * of(k, states[i * d + k]) / static_cast<double>(rounds_.size());
+      }
+      return mean;
+    };
+    const std::vector<double> mean = mean_over_rounds([](std::size_t, double x) { return x; });
+    std::vector<double> sd = mean_over_rounds([&](std::size_t k, double x) { return (x - mean[k]) * (x - mean[k]); });
+    for (std::size_t k = 0; k < d; ++k) sd[k] = std::max(std::sqrt(sd[k]), 1e-12 * (1 + std::abs(mean[k])));
+    return sd;
   }
 
   /// Returns the level at which the rates of the first and the second half differ.

@@ -64,8 +64,10 @@ MeshEstimate steps_from_quasi_stationary(const SplittingStudy& study);
 ///
 /// No number is given where fewer than 30 independent lines lead to failure (a line is founded one to two windows
 /// before; a window is 1.5 mixing times, and as many steps as a failure takes), where the interval is wider than a
-/// factor of four, and where, at a level of 0.001, rates change between the halves of the rounds or rounds split by
-/// different levels differ.
+/// factor of four, where, at a level of 0.001, rates change between the halves of the rounds or rounds split by
+/// different levels differ, and where walks have slipped into another gait (StartGait) and the share of those has not
+/// settled: it may change by less than a tenth, two standard errors included, from the end of the burn-in to that of
+/// the rounds. Maps that draw for themselves cannot be followed without noise: of these no other gait is seen.
 /// @throws std::invalid_argument for options out of range; std::runtime_error where no replica fails, saying after how
 /// many steps of the map; MapError as WeightedEnsemble
 SplittingStudy splitting_study(const BatchMap& map, std::span<const double> start,

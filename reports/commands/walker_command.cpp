@@ -45,7 +45,7 @@ Provenance walker_provenance(const WalkerRequest& request) {
 std::optional<SplittingAnswer> ask_both_ways(WalkerMethod method, const std::string& name,
                                              const std::function<const markov::MeshStudy*()>& mesh,
                                              const std::function<markov::SplittingStudy()>& split) {
-  SplittingAnswer answer{name, {}, {}};
+  SplittingAnswer answer{name, {}, {}, {}};
   const markov::MeshStudy* found = nullptr;
   if (method == WalkerMethod::mesh) try {
       mesh();
@@ -64,7 +64,13 @@ std::optional<SplittingAnswer> ask_both_ways(WalkerMethod method, const std::str
       answer.no_mesh = error.what();
     }
   if (method == WalkerMethod::mesh) return std::nullopt;
-  answer.passage = split();
+  try {
+    answer.passage = split();
+  } catch (const markov::Disagreement& error) {
+    if (!found) throw;
+    answer.no_splitting = error.what();
+    return answer;
+  }
   if (found) markov::require_agreement(*found, answer.passage, name);
   return answer;
 }
@@ -107,14 +113,14 @@ std::string walker_answer_json(const WalkerRequest& request, const WalkerAnswer&
   if (answer.studies.empty()) return splitting_json(*answer.splitting, answer.moments, walker_provenance(request));
   const std::string json =
       walker_json(request.settings.front(), answer.studies.front(), answer.moments, walker_provenance(request));
-  return answer.splitting ? with_splitting_json(json, answer.splitting->passage) : json;
+  return answer.splitting ? with_splitting_json(json, *answer.splitting) : json;
 }
 
 std::string walker_answer_text(const WalkerRequest& request, const WalkerAnswer& answer, std::size_t width) {
   if (request.settings.size() > 1) return walkers_text(request.settings, answer.studies);
   if (answer.studies.empty()) return splitting_text(*answer.splitting, answer.moments, width);
   const std::string text = walker_text(request.settings.front(), answer.studies.front(), answer.moments, width);
-  return answer.splitting ? with_splitting_text(text, answer.splitting->passage) : text;
+  return answer.splitting ? with_splitting_text(text, *answer.splitting) : text;
 }
 
 namespace {

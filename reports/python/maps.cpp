@@ -200,8 +200,8 @@ py::dict study_map(const py::dict& fields, const py::dict& options, const std::s
                   to_html(splitting_table(*splitting, provenance)), arrays);
   std::string json = map_json(found, moments, provenance), text = map_text(found, moments, line_width);
   if (splitting) {
-    json = with_splitting_json(json, splitting->passage);
-    text = with_splitting_text(text, splitting->passage);
+    json = with_splitting_json(json, *splitting);
+    text = with_splitting_text(text, *splitting);
   }
   return answer(json, text, to_html(mesh_table(python.name, found.passage, provenance)), arrays);
 }

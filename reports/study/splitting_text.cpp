@@ -101,15 +101,17 @@ Table splitting_table(const SplittingAnswer& answer, const Provenance& provenanc
   return table;
 }
 
-std::string with_splitting_json(const std::string& mesh_json, const markov::SplittingStudy& study) {
+std::string with_splitting_json(const std::string& mesh_json, const SplittingAnswer& beside) {
   Json json = Json::parse(mesh_json);
-  json["splitting"] = study_json(study);
+  json["splitting"] =
+      beside.no_splitting.empty() ? study_json(beside.passage) : Json{{"no_number", beside.no_splitting}};
   return json.dump(2) + "\n";
 }
 
-std::string with_splitting_text(const std::string& mesh_text, const markov::SplittingStudy& study) {
-  Lines lines = steps_lines(study);
-  for (auto& line : effort_lines(study)) lines.push_back(std::move(line));
+std::string with_splitting_text(const std::string& mesh_text, const SplittingAnswer& beside) {
+  if (!beside.no_splitting.empty()) return mesh_text + "\nBeside it, by splitting: " + beside.no_splitting + "\n";
+  Lines lines = steps_lines(beside.passage);
+  for (auto& line : effort_lines(beside.passage)) lines.push_back(std::move(line));
   return mesh_text + "\nBeside it, by splitting (agreed: within the joint interval)\n" + joined(lines);
 }
 

@@ -16,7 +16,8 @@ namespace metastable::reports {
 struct SplittingAnswer {
   std::string name;
   markov::SplittingStudy passage;
-  std::string no_mesh;  ///< why there is no mesh beside it: a clause; empty: it was not asked
+  std::string no_mesh;       ///< why there is no mesh beside it: a clause; empty: it was not asked
+  std::string no_splitting;  ///< why there is only the mesh: a sentence; empty: `passage` is told
 };
 
 /// Does `split` with a listener of its own, refused where rounds contradict each other.
@@ -38,8 +39,9 @@ std::string splitting_text(const SplittingAnswer& answer, const std::optional<an
                            std::size_t width);
 Table splitting_table(const SplittingAnswer& answer, const Provenance& provenance);
 
-/// Returns the JSON and the text of a mesh's study with splitting beside it, under the key "splitting".
-std::string with_splitting_json(const std::string& mesh_json, const markov::SplittingStudy& study);
-std::string with_splitting_text(const std::string& mesh_text, const markov::SplittingStudy& study);
+/// Returns the JSON and the text of a mesh's study with splitting beside it, under the key "splitting": what it found,
+/// or "no_number" with the reason why it has none.
+std::string with_splitting_json(const std::string& mesh_json, const SplittingAnswer& beside);
+std::string with_splitting_text(const std::string& mesh_text, const SplittingAnswer& beside);
 
 }  // namespace metastable::reports

@@ -172,6 +172,22 @@ TEST(SplittingStudy, SaysAfterHowManyStepsNothingFailed) {
   }
 }
 
+TEST(SplittingStudy, GivesNoNumberWhereWalksSlipIntoAnotherGaitTooSeldomToSettle) {
+  const TwoGaits two{.sd = 0.3, .far = 0.9};  // slips come every 793 steps
+  for (const std::uint64_t seed : {1U, 2U}) {
+    SplittingOptions options = quick;
+    options.seed = seed;
+    const SplittingStudy study = splitting_study(two.batch(), std::vector{-1.0}, options);
+    EXPECT_NE(study.disagreement.find("are in another gait, at x1 = 0.99"), std::string::npos) << study.disagreement;
+    EXPECT_THROW(require_agreement(study, "two gaits"), Disagreement);
+  }
+}
+
+TEST(SplittingStudy, CountsGaitsBetweenWhichWalksSlipOften) {
+  const TwoGaits two{.sd = 0.7, .far = 2.6};
+  expect_near(splitting_study(two.batch(), std::vector{-1.0}, quick), two.steps());
+}
+
 TEST(SplittingStudy, NamesOptionsOutOfRange) {
   const auto refusal = [](SplittingOptions options) {
     try {

@@ -155,6 +155,19 @@ class Steps(unittest.TestCase):
         with self.assertRaisesRegex(metastable.InputError, "spacing: has no meaning under method splitting"):
             walker.study(method="splitting", spacing=1)
 
+    def test_a_mesh_stands_alone_where_splitting_has_no_number(self):
+        def two_gaits(state, noise):
+            following = np.tanh(3 * state) + 0.3 * noise
+            return following, following[:, 0] < -1.9
+
+        walker = metastable.walker(two_gaits, 1, 1, start=[-1])
+        with self.assertRaisesRegex(metastable.Contradiction, "are in another gait, at"):
+            walker.study(method="splitting", tolerance=0.3)
+        study = walker.study(method="auto", tolerance=0.3)
+        self.assertLess(abs(np.log(study.expected_steps.value / 1767.8)), 0.01)
+        self.assertIn("are in another gait, at", study.splitting["no_number"])
+        self.assertIn("Beside it, by splitting: ", str(study))
+
     def test_a_biped_is_walked_without_a_mesh(self):
         biped = metastable.WalkerSetting("biped", slope_sd_deg=3)
         with self.assertRaisesRegex(metastable.InputError, "the biped has 9 dimensions, where meshes hold 1 to 4"):
