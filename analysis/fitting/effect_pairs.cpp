@@ -179,8 +179,29 @@ void refine_paired(const RankingProblem& problem, EffectPairs& ranked, ScansBesi
   fit_pairs(problem, ranked.singles, tries, ranked.pairs);
 }
 
-// Other effects may act like the second one of the best pair, as torques do: all that promise about as much beside the
-// first are fitted, so that the set names them.
+// Lists the pairs of what acts like an effect of a pair by itself, with the other one: of large effects, what scores
+// promise beside the other one differs by more than what they turn out to gain.
+void add_alike_alone(const RankingProblem& problem, const EffectPairs& ranked, ScansBeside& beside,
+                     const EffectTerm& term, const EffectTerm& partner, std::vector<Try>& tries) {
+  const SingleEffects& singles = ranked.singles;
+  const double least = singles.causes[problem.index_of(term.candidate)].evidence - alike_margin;
+  for (std::size_t i = 0; i < singles.causes.size(); ++i) {
+    const RankedCause& other = singles.causes[i];
+    if (!other.fitted() || other.candidate_undecided() || !(other.evidence >= least)) continue;
+    const Candidate* candidate = other.terms.front().candidate;
+    if (candidate->parameters.empty() || candidate == term.candidate || candidate == partner.candidate) continue;
+    const ScannedEffect* second = beside.of(singles, i).find(partner.candidate);
+    if (!second || is_tried(tries, i, partner.candidate) ||
+        std::ranges::any_of(ranked.pairs, [&](const RankedCause& pair) {
+          return extends(pair.terms, {other.terms.front(), partner});
+        }))
+      continue;
+    tries.push_back({i, *second});
+  }
+}
+
+// Other effects may act like one of the best pair, as torques do: all that promise about as much beside the other one,
+// or are about as likely alone, are fitted, so that the set names them.
 void complete_pairs(const RankingProblem& problem, EffectPairs& ranked, ScansBeside& beside) {
   const RankedCause* best = near_best_pair(ranked);
   if (!best) return;
@@ -195,6 +216,8 @@ void complete_pairs(const RankingProblem& problem, EffectPairs& ranked, ScansBes
           }))
         tries.push_back({leader, *effect});
   }
+  for (const std::size_t k : {0, 1})
+    add_alike_alone(problem, ranked, beside, best->terms[k], best->terms[1 - k], tries);
   fit_pairs(problem, ranked.singles, tries, ranked.pairs);
 }
 

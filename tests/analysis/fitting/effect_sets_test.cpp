@@ -116,6 +116,41 @@ TEST(EffectSets, HoldWhatActsLikeOneOfThem) {
   EXPECT_NEAR(evidence({"wave 0", "wave 1", "wave 2"}), evidence({"wave 5", "wave 1", "wave 2"}), 6);
 }
 
+// Two waves of which the first is large; wave 5 is the first at its size, and another direction where it is small.
+class BentWaves : public Waves {
+ public:
+  explicit BentWaves(const Line& from) : Waves(from, 2) {
+    for (std::size_t i = 0; i < y_.size(); ++i) y_[i] += 2.8 * std::sin(1.3 * static_cast<double>(i));
+  }
+  Evaluation evaluate(std::span<const double> n, std::span<const EffectTerm> terms) const override {
+    std::vector<EffectTerm> seen(terms.begin(), terms.end());
+    for (std::size_t k = 0; k < terms.size(); ++k)
+      if (terms[k].candidate->id == "wave 5") {
+        EffectTerm aside = terms[k];
+        seen[k].candidate = &candidates_[0], aside.candidate = &candidates_[4];
+        aside.values[0] *= 0.15 * (3 - aside.values[0]);
+        seen.push_back(std::move(aside));
+      }
+    return Waves::evaluate(n, seen);
+  }
+};
+
+// Scores promise little of it beside the second wave. It is as likely alone as the first, and so the pair is tried.
+TEST(EffectSets, PairsHoldWhatIsAsLikelyAlone) {
+  const BentWaves model(line(0, 1, 2400));
+  const CauseRanking ranking = ranked(model);
+  const auto gain = [&](const std::set<std::string>& wanted) {
+    for (const RankedCause& pair : ranking.pairs) {
+      std::set<std::string> ids;
+      for (const EffectTerm& term : pair.terms) ids.insert(term.candidate->id);
+      if (ids == wanted) return pair.gain;
+    }
+    ADD_FAILURE() << "a pair was not tried";
+    return 0.0;
+  };
+  EXPECT_NEAR(gain({"wave 0", "wave 1"}), gain({"wave 5", "wave 1"}), 6);
+}
+
 // The order in which the search met two effects does not decide what the pair is worth: the stronger one comes first.
 TEST(EffectSets, AreWorthWhatTheyEarnBeyondTheBestPart) {
   const AlikeWaves model(line(0, 1, 2400), 3);
