@@ -201,6 +201,13 @@ Estimate bounded_by_count(const Estimate& joined, const StepsBeforeFailure& coun
   return narrower ? joined : Estimate{counted.observed, counted.observed_lower, counted.observed_upper};
 }
 
+MachineSteps survivors_steps(const std::string& where, double model_lower, const StepsBeforeFailure& counted,
+                             bool explained) {
+  const double seen = where.empty() ? counted.observed_lower : 0;
+  const double known = explained && std::isfinite(model_lower) ? model_lower : 0;
+  return {where, {infinite, std::max({1.0, seen, known}), infinite}, true};
+}
+
 void add_machine_steps(Diagnosis& d, const TransitionModel& model, const WeighedFit& recalibrated,
                        const std::vector<WeighedFit>& fits, const Elsewhere& elsewhere, const DiagnosisOptions& options,
                        const std::function<void()>& heartbeat) {
@@ -217,11 +224,15 @@ void add_machine_steps(Diagnosis& d, const TransitionModel& model, const Weighed
   const ModelError error = model_error(d);
   const auto add = [&](const std::string& where, const std::vector<double>& there) {
     MachineSteps machine{where, joined_steps(of_effects, there, error, at_risk, rests), false};
+    if (at_risk > 0 && rests == 0) {
+      s.machine.push_back(survivors_steps(where, machine.steps.lower, s, d.verdict != Verdict::unexplained));
+      return;
+    }
     if (where.empty()) machine.steps = bounded_by_count(machine.steps, s);
     machine.at_least = !std::isfinite(machine.steps.upper);
-    // A model that never fails, and trials that did not: so many steps are seen as no failure excludes.
-    if (where.empty() && !std::isfinite(machine.steps.lower)) machine.steps.lower = s.observed_lower;
-    if (std::isfinite(machine.steps.lower) && machine.steps.lower > 0) s.machine.push_back(std::move(machine));
+    for (double* one : {&machine.steps.lower, &machine.steps.value, &machine.steps.upper})
+      *one = std::max(1.0, *one);  // the step that fails counts
+    if (std::isfinite(machine.steps.lower)) s.machine.push_back(std::move(machine));
   };
   add("", of_effects);
   if (elsewhere.second) add(elsewhere.first, draw(*elsewhere.second, fits.empty() ? plain : fits, draws_of_machine));

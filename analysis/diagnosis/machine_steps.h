@@ -58,6 +58,12 @@ Estimate joined_steps(const std::vector<double>& here, const std::vector<double>
 /// @param counted  as set_observed() leaves it
 Estimate bounded_by_count(const Estimate& joined, const StepsBeforeFailure& counted);
 
+/// Returns what is known where no trial failed: a lower end alone, with 95 %. It is the larger one of the count's,
+/// which holds for the experiment measured, and of what the models leave open, where they explain the data; 1 at least.
+/// @param model_lower  the lower end of joined_steps()  @param counted  as set_observed() leaves it
+MachineSteps survivors_steps(const std::string& where, double model_lower, const StepsBeforeFailure& counted,
+                             bool explained);
+
 /// Fills in the intervals of the models' expected steps, and the machine's own; none where neither the models nor the
 /// count bound them.
 /// @param fits  the models that may be the machine, by their probabilities (none: the recalibrated model alone)

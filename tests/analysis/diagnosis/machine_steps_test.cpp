@@ -154,6 +154,19 @@ TEST(MachineSteps, RestsRefuteAModelThatNeverFails) {
   EXPECT_NEAR(e.upper, 1000 / 5.4254, 1e-2);
 }
 
+// Trials that all survive bound the steps from below; a model that does not explain them says nothing more.
+TEST(MachineSteps, SurvivorsLeaveABound) {
+  StepsBeforeFailure counted;
+  set_observed(counted, {300, 0});
+  const MachineSteps by_count = survivors_steps("", 5000, counted, false);
+  EXPECT_TRUE(by_count.at_least);
+  EXPECT_NEAR(by_count.steps.lower, 300 / -std::log(0.05), 1e-9);
+  EXPECT_EQ(by_count.steps.upper, infinity);
+  EXPECT_EQ(survivors_steps("", 5000, counted, true).steps.lower, 5000);
+  EXPECT_EQ(survivors_steps("", infinity, counted, true).steps.lower, by_count.steps.lower);
+  EXPECT_EQ(survivors_steps("on a slope of 8 deg", 7e-22, counted, true).steps.lower, 1);
+}
+
 // 25 rests in 850 collisions; a model whose draws reach from 0.7 to 142 steps says less than they do.
 TEST(MachineSteps, AreNoWiderThanTheCount) {
   StepsBeforeFailure counted;
