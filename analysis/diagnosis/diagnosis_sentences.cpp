@@ -6,6 +6,7 @@
 #include <cmath>
 
 #include "analysis/diagnosis/not_possible.h"
+#include "analysis/statistics/estimate.h"
 #include "analysis/statistics/number_text.h"
 
 namespace metastable::analysis {
@@ -74,10 +75,10 @@ void say_unnamed(std::vector<std::string>& s, const Diagnosis& d) {
                   facet->facet, facet->aspect, facet->stance ? "stances" : d.data.step_name + "s"));
 }
 
-// A share of what is held out may come out below nothing or above all.
+// A share of what is held out may come out below nothing or above all; none is known to be nothing.
 std::string percent(double share) {
   const double rounded = std::round(100 * std::clamp(share, 0.0, 1.0));
-  return share > 0 && rounded < 1 ? "less than 1 %" : fmt::format("{:.0f} %", rounded + 0.0);
+  return rounded < 1 ? "less than 1 %" : fmt::format("{:.0f} %", rounded);
 }
 
 std::string with_size(const AtWork& one) {
@@ -91,18 +92,18 @@ std::string with_size(const AtWork& one) {
   return text;
 }
 
-// Says what is at work with the shares that it closes.
+// Says what is at work, each with its probability and the shares that it closes.
 void say_what_is_at_work(std::vector<std::string>& s, const Diagnosis& d) {
-  std::vector<std::string> all;
+  const bool several = d.causes.at_work.size() > 1;
   for (const AtWork& one : d.causes.at_work) {
     if (one.probability < d.rules.least_at_work) continue;
     std::string closes;
-    if (one.closes_alone) closes = fmt::format(", closes {} of the gap alone", percent(one.closes_alone->value));
-    if (one.closes_alone && one.closes_beside)
-      closes += fmt::format(" and {} as the last", percent(one.closes_beside->value));
-    all.push_back(with_size(one) + closes);
+    if (one.closes_alone)
+      closes = fmt::format("; it closes {} of the gap{}", percent(one.closes_alone->value), several ? " alone" : "");
+    if (one.closes_alone && one.closes_beside && several)
+      closes += fmt::format(", {} when it is added last", percent(one.closes_beside->value));
+    s.push_back(fmt::format("At work with probability {:.2f}: {}{}.", one.probability, with_size(one), closes));
   }
-  if (!all.empty()) s.push_back(fmt::format("At work: {}.", fmt::join(all, "; ")));
 }
 
 // Says how much of the gap stays without a name, and where.
@@ -135,7 +136,7 @@ void say_explained(std::vector<std::string>& s, const Diagnosis& d) {
                             : likeliest.effects.size() == 2
                                 ? "two effects together explain"
                                 : fmt::format("{} effects together explain", likeliest.effects.size()),
-                            with_parameters(likeliest)));
+                            likeliest.name()));
   } else {
     s.push_back(
         fmt::format("There is a gap that recalibration does not remove. These data cannot tell {} causes apart: {}.",
@@ -143,6 +144,7 @@ void say_explained(std::vector<std::string>& s, const Diagnosis& d) {
     s.push_back(
         fmt::format("The likeliest is {} with probability {:.2f}.", with_parameters(likeliest), likeliest.probability));
   }
+  say_what_is_at_work(s, d);
   if (without_effect(d) > 1 - d.rules.least_at_work) s.push_back(without_effect_in_words(d));
   if (!d.causes.size.empty()) s.push_back(d.causes.size);
   if (const auto left =
@@ -250,8 +252,10 @@ void say_machine_steps(std::vector<std::string>& s, const Diagnosis& d) {
                               : d.data.step_name == "step" ? " in trials like these"
                                                            : "";
     if (machine.at_least) {
-      s.push_back(fmt::format("This machine takes at least {} {}s before failure{} (95 %).",
-                              format_number(machine.steps.lower, NumberFormat::general, 2), d.data.step_name, where));
+      const bool alone = d.shrinkage.steps.observed == infinite;
+      s.push_back(fmt::format("This machine takes at least {} {}s before failure{} (95 %{}).",
+                              format_number(machine.steps.lower, NumberFormat::general, 2), d.data.step_name, where,
+                              alone ? "; no trial failed" : ""));
       continue;
     }
     const DecimalEstimate steps = to_decimal(machine.steps, NumberFormat::general, 3);
@@ -304,6 +308,22 @@ std::string closed_unknown(const Shrinkage& s) {
                      plain_text(percent.upper));
 }
 
+// Says what a changed experiment buys: how much evidence between the causes it is expected to give, beside the same
+// experiment and beside what tells them apart.
+std::string what_it_buys(const Diagnosis& d) {
+  const NextExperiment& best = d.limits.next.front();
+  const auto same = std::ranges::find_if(d.limits.next, [](const NextExperiment& one) { return one.changes.empty(); });
+  std::string text = fmt::format(", with a likelihood ratio between them of {:.2g}", std::exp(0.5 * best.separation));
+  if (same != d.limits.next.end() && &*same != &best)
+    text += fmt::format(" expected ({:.2g} from the same experiment again)", std::exp(0.5 * same->separation));
+  else
+    text += " expected";
+  if (best.separation < d.rules.told_apart)
+    text += fmt::format("; no change looked at reaches the {:.0f} that tell causes apart, so take several such",
+                        std::exp(0.5 * d.rules.told_apart));
+  return text;
+}
+
 std::string next_step(const Diagnosis& d) {
   switch (d.verdict) {
     case Verdict::no_gap:
@@ -320,9 +340,8 @@ std::string next_step(const Diagnosis& d) {
             d.causes.set.front(), taken_out_of(parts_of(d.causes.set.front())));
       if (!d.limits.next.empty())
         return fmt::format(
-            "Tell the causes apart before changing the model: {} would do it best (“The next "
-            "experiment”).",
-            d.limits.next.front().change);
+            "Tell the causes apart before changing the model: {} would do it best{} (“The next experiment”).",
+            d.limits.next.front().change, what_it_buys(d));
       return fmt::format("Tell the causes apart before changing the model: with more trials{}.",
                          d.limits.missing.empty() ? "" : ", or with a column under “What missing columns hide”");
     case Verdict::partly_explained: {
