@@ -117,6 +117,18 @@ std::vector<const Candidate*> wanted(const TransitionModel& model, const std::ve
   std::vector<const Candidate*> candidates;
   for (const Candidate& candidate : model.candidates())
     if (!restricted || std::find(ids.begin(), ids.end(), candidate.id) != ids.end()) candidates.push_back(&candidate);
+  // Another law has no parameters, and is compared all the same.
+  // What is compared whole, as another law is, has nothing that chance can be drawn of.
+  const auto scanned = [](const Candidate* one) { return one->undecidable.empty() && !one->parameters.empty(); };
+  if (std::ranges::none_of(candidates, scanned)) {
+    std::string why;
+    for (const Candidate* one : candidates)
+      why += fmt::format(
+          "; {}: {}", one->id,
+          one->undecidable.empty() ? "it has no parameters: name another effect beside it" : one->undecidable);
+    throw std::invalid_argument(
+        fmt::format("catalogue: these data under this law can show none of {}{}", fmt::join(ids, ", "), why));
+  }
   return candidates;
 }
 

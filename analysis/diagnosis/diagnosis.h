@@ -24,8 +24,9 @@ namespace metastable::analysis {
 struct DiagnosisOptions {
   std::uint64_t seed = 1;
   int threads = 0;  ///< the same bits on any number
-  /// Lists ids to consider, those the model lacks left out; none: all. A pair, "trial_drift+bounce", is tried in any
-  /// case, not only where the scores promise something.
+  /// Lists ids to consider; none: all. Those that the model knows and these data or its law cannot have are left out
+  /// and listed in Diagnosis::Limits::not_possible. A pair, "trial_drift+bounce", is tried in any case, not only where
+  /// the scores promise something.
   std::vector<std::string> catalogue = {};
   int draws = 2000;     ///< bootstrap draws of each chance level, >= 200; the map as given takes half
   double level = 0.02;  ///< of the tests for a gap, before and after recalibration, in (0, 0.5)

@@ -4,6 +4,8 @@
 
 #include <algorithm>
 #include <cmath>
+#include <map>
+#include <string>
 
 #include "analysis/gap/map_cells.h"
 
@@ -16,6 +18,25 @@ constexpr double surely = 0.95;
 std::optional<std::size_t> whole(double trials) {
   if (!(trials < most_trials)) return std::nullopt;
   return static_cast<std::size_t>(std::ceil(std::max(1.0, trials) - 1e-9));
+}
+
+/// Returns the effects asked for that these data or their law cannot show, with the reason.
+std::map<std::string, std::string> asked_in_vain(const TransitionModel& model,
+                                                 const std::vector<std::string>& catalogue) {
+  std::map<std::string, std::string> reasons;
+  const auto look_at = [&](const std::string& id) {
+    const auto candidate = std::ranges::find(model.candidates(), id, &Candidate::id);
+    if (candidate == model.candidates().end())
+      reasons[id] = "the model does not have it with this law and these columns";
+    else if (!candidate->undecidable.empty())
+      reasons[id] = candidate->undecidable;
+  };
+  for (const std::string& entry : catalogue) {
+    const auto plus = entry.find('+');
+    look_at(entry.substr(0, plus));
+    if (plus != std::string::npos) look_at(entry.substr(plus + 1));
+  }
+  return reasons;
 }
 
 }  // namespace
@@ -63,6 +84,8 @@ std::vector<NotPossible> not_possible(const TransitionModel& model, const Diagno
                    fmt::format("{:.0f} transitions for {} legs; a cell of the map takes {}", speeds, model.legs(),
                                least_cell_events),
                    whole(least_cell_events * model.legs() * trials / speeds), true});
+  for (const auto& [id, because] : asked_in_vain(model, options.catalogue))
+    all.push_back({fmt::format("whether {} is at work", id), because, {}});
   for (const Detectability& v : d.limits.visible)
     if (v.times_more > 1)
       all.push_back({fmt::format("whether {} is at work", v.effect),

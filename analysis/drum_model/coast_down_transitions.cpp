@@ -100,7 +100,6 @@ class CoastDownTransitions : public TransitionModel {
   const std::vector<Nuisance>& nuisances() const override { return nuisances_; }
   const std::vector<Candidate>& candidates() const override { return candidates_; }
   std::string step_name() const override { return "revolution"; }
-  std::vector<std::string> effect_ids() const override { return dynamics::effect_ids(); }
   std::vector<EffectGroup> groups() const override {
     return {{"a torque that grows with speed", {"axle_drag_viscous", "air_drag"}},
             {"a constant or growing torque", {"rolling_resistance", "axle_drag_viscous", "air_drag"}},

@@ -5,6 +5,7 @@
 
 #include <algorithm>
 #include <cstddef>
+#include <ranges>
 #include <stdexcept>
 
 namespace metastable::analysis {
@@ -53,6 +54,12 @@ void require_word(std::string_view called, std::string_view word, const std::vec
   if (std::ranges::find(known, word) == known.end())
     throw std::invalid_argument(
         fmt::format("{}: '{}' is none of {}{}", called, word, fmt::join(known, ", "), did_you_mean(word, known)));
+}
+
+void require_effects(const std::vector<std::string>& catalogue, const std::vector<std::string>& known) {
+  for (const std::string& entry : catalogue)
+    for (const auto id : std::views::split(entry, '+'))
+      require_word("catalogue", std::string_view(id.begin(), id.end()), known);
 }
 
 }  // namespace metastable::analysis

@@ -18,4 +18,7 @@ std::string did_you_mean(std::string_view word, const std::vector<std::string>& 
 /// @throws std::invalid_argument "--law: 'plastik' is none of published, ..., settled; did you mean 'plastic'?"
 void require_word(std::string_view called, std::string_view word, const std::vector<std::string>& known);
 
+/// Does the same for effects, alone or in pairs "trial_drift+bounce".
+void require_effects(const std::vector<std::string>& catalogue, const std::vector<std::string>& known);
+
 }  // namespace metastable::analysis

@@ -5,6 +5,7 @@
 #include <fmt/format.h>
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 #include <filesystem>
 #include <fstream>
@@ -85,6 +86,11 @@ TEST_F(DiagnoseCommand, TakesACoastDown) {
   std::ofstream(path("drum/experiment.toml"))
       << "system = \"coast_down\"\ntitle = \"Drum\"\n[rotor]\ninertia_kg_m2 = 1.0\n[loss]\nconstant = 0.15\n"
          "linear = 0.0\nquadratic = 0.00165\nnoise_sd = 0.14\n[[condition]]\nid = \"drum\"\n";
+  const Ran wheels = metastable({"diagnose", path("drum"), "--catalogue", "leg_contact"});
+  EXPECT_EQ(wheels.code, 2);
+  EXPECT_NE(wheels.err.find("catalogue: 'leg_contact' is none of axle_drag_viscous, rolling_resistance"),
+            std::string::npos)
+      << wheels.err;
   const Ran ran = metastable({"diagnose", path("drum"), "--json", "-"});
   ASSERT_EQ(ran.code, 0) << ran.err;
   const auto json = nlohmann::json::parse(ran.out);
@@ -97,6 +103,24 @@ TEST_F(DiagnoseCommand, NamesTheKnownEffects) {
   EXPECT_EQ(ran.code, 2);
   for (const char* part : {"'lag_contact'", "leg_contact", "slip_reversal"})
     EXPECT_NE(ran.err.find(part), std::string::npos) << part << "\n" << ran.err;
+}
+
+// What this law cannot have is left out and said; where nothing is left, it is refused.
+TEST_F(DiagnoseCommand, SaysWhichEffectsTheModelCannotHave) {
+  ASSERT_EQ(
+      metastable({"simulate", "--slope", "9.59", "--law", "published", "--trials", "20", "--out", path("wheel")}).code,
+      0);
+  const Ran some = metastable({"diagnose", path("wheel"), "--catalogue", "soft_contact,slope_offset", "--json", "-"});
+  ASSERT_EQ(some.code, 0) << some.err;
+  const auto untold = nlohmann::json::parse(some.out).at("not_possible");
+  EXPECT_TRUE(std::ranges::any_of(untold, [](const auto& one) {
+    return one.at("statement") == "whether soft_contact is at work";
+  })) << untold;
+  const Ran none = metastable({"diagnose", path("wheel"), "--catalogue", "soft_contact"});
+  EXPECT_EQ(none.code, 2);
+  EXPECT_EQ(none.err,
+            "metastable: catalogue: these data under this law can show none of soft_contact; soft_contact: no impact "
+            "lasts but under `settled`\n");
 }
 
 // A wrong option, key or value gives exit code 2 and one line that names it and what is allowed.
