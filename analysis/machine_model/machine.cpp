@@ -17,6 +17,7 @@ namespace {
 
 constexpr std::size_t most_states = 30;
 constexpr int most_scores = 16;
+constexpr double beyond_all_bounds = 1e100;  // size of a state from which a map may overflow
 constexpr std::size_t most_works = 8;  // works whose steps are joined: more of them hold more memory and save little
 thread_local const markov::BatchMap* joined = nullptr;  // of the work that runs on this thread; nullptr: none
 
@@ -24,11 +25,20 @@ void require_finite(const std::string& what, double value) {
   if (!std::isfinite(value)) throw std::invalid_argument(fmt::format("{}: {} is not a finite number", what, value));
 }
 
+// Refuses bounds that hold no range.
+void require_bounds(const std::string& what, double lower, double upper) {
+  if (lower > upper)
+    throw std::invalid_argument(fmt::format("{}: lower is above upper in its bounds [{}, {}]", what, lower, upper));
+  if (!(lower < upper))
+    throw std::invalid_argument(fmt::format("{}: its bounds [{}, {}] leave it no room", what, lower, upper));
+}
+
 void require_parameter(const MachineParameter& p) {
   require_finite("parameters: " + p.name, p.nominal);
   if (!(p.sd >= 0) || !std::isfinite(p.sd))
     throw std::invalid_argument(fmt::format("parameters: {}: the sd {} is not in [0, inf)", p.name, p.sd));
-  if (!(p.lower < p.upper) || !(p.lower <= p.nominal && p.nominal <= p.upper))
+  require_bounds("parameters: " + p.name, p.lower, p.upper);
+  if (!(p.lower <= p.nominal && p.nominal <= p.upper))
     throw std::invalid_argument(fmt::format("parameters: {}: the nominal value {} is outside its bounds [{}, {}]",
                                             p.name, p.nominal, p.lower, p.upper));
 }
@@ -36,11 +46,14 @@ void require_parameter(const MachineParameter& p) {
 void require_effect(const MachineEffect& effect) {
   if (effect.parameters.empty()) throw std::invalid_argument(fmt::format("effects: {}: has no parameter", effect.id));
   for (const SuspectedParameter& p : effect.parameters) {
-    require_finite(fmt::format("effects: {}: {}", effect.id, p.name), p.neutral);
-    if (!std::isfinite(p.lower) || !std::isfinite(p.upper) || !(p.lower < p.upper) ||
-        !(p.lower <= p.neutral && p.neutral <= p.upper))
-      throw std::invalid_argument(fmt::format("effects: {}: {}: the neutral value {} is outside its bounds [{}, {}]",
-                                              effect.id, p.name, p.neutral, p.lower, p.upper));
+    const std::string what = fmt::format("effects: {}: {}", effect.id, p.name);
+    require_finite(what, p.neutral);
+    require_finite(what + ": lower", p.lower);
+    require_finite(what + ": upper", p.upper);
+    require_bounds(what, p.lower, p.upper);
+    if (!(p.lower <= p.neutral && p.neutral <= p.upper))
+      throw std::invalid_argument(
+          fmt::format("{}: the neutral value {} is outside its bounds [{}, {}]", what, p.neutral, p.lower, p.upper));
   }
 }
 
@@ -114,6 +127,50 @@ void Machine::require_valid() const {
   }
   if (!(most_wild >= 0 && most_wild <= 0.2))
     throw std::invalid_argument(fmt::format("most_wild: {} is outside [0, 0.2]", most_wild));
+}
+
+namespace {
+
+// Says whether a row of a call holds numbers from which a step of the machine can be asked for: a state that has grown
+// beyond all bounds is one that the map need not understand.
+bool answerable(const MachineBatch& batch, std::size_t row, std::size_t states, std::size_t scores) {
+  const auto real = [](double x) { return std::isfinite(x); };
+  const auto bounded = [](double x) { return std::abs(x) < beyond_all_bounds; };
+  return std::ranges::all_of(batch.states.subspan(row * states, states), bounded) &&
+         std::ranges::all_of(batch.scores.subspan(row * scores, scores), real) &&
+         std::ranges::all_of(batch.values, [&](const auto& one) { return real(one.size() == 1 ? one[0] : one[row]); });
+}
+
+[[noreturn]] void refuse_nan(const Machine& machine, const MachineBatch& batch, std::size_t row, std::size_t state) {
+  std::vector<std::string> from;
+  const std::size_t states = machine.states.size(), scores = static_cast<std::size_t>(machine.scores);
+  for (std::size_t s = 0; s < states; ++s)
+    from.push_back(fmt::format("{} {:.6g}", machine.states[s], batch.states[row * states + s]));
+  for (std::size_t m = 0; m < scores; ++m)
+    from.push_back(
+        fmt::format("noise{} {:.6g}", scores > 1 ? fmt::format(" {}", m + 1) : "", batch.scores[row * scores + m]));
+  const std::vector<std::string> names = machine.value_names();
+  for (std::size_t v = 0; v < names.size(); ++v)
+    from.push_back(fmt::format("{} {:.6g}", names[v], batch.value(v, row)));
+  throw std::invalid_argument(fmt::format(
+      "step: the next {} is NaN, and not marked as failed, from {}: where there is no next state, failed has "
+      "to be true",
+      machine.states[state], fmt::join(from, ", ")));
+}
+
+}  // namespace
+
+std::shared_ptr<const Machine> refusing_nan(std::shared_ptr<const Machine> machine) {
+  if (!machine->step) return machine;
+  auto all = std::make_shared<Machine>(*machine);
+  all->step = [machine = std::move(machine)](const MachineBatch& batch) {
+    machine->step(batch);
+    const std::size_t states = machine->states.size(), scores = static_cast<std::size_t>(machine->scores);
+    for (std::size_t i = 0; i < batch.next.size(); ++i)
+      if (std::isnan(batch.next[i]) && !batch.failed[i / states] && answerable(batch, i / states, states, scores))
+        refuse_nan(*machine, batch, i / states, i % states);
+  };
+  return all;
 }
 
 namespace {

@@ -96,6 +96,10 @@ struct Machine {
   void require_valid() const;
 };
 
+/// Returns a machine whose step throws std::invalid_argument, naming state, row and values, where a state is NaN that
+/// is not marked as failed: a map that cannot say what comes next would else be taken for a machine that falls there.
+std::shared_ptr<const Machine> refusing_nan(std::shared_ptr<const Machine> machine);
+
 /// Returns a machine whose steps are brought together while works run side_by_side().
 Machine joining_steps(std::shared_ptr<const Machine> machine);
 

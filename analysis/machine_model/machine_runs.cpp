@@ -4,6 +4,8 @@
 
 #include <algorithm>
 #include <cmath>
+#include <functional>
+#include <limits>
 #include <map>
 #include <numbers>
 #include <numeric>
@@ -18,15 +20,20 @@ namespace {
 // share.
 struct UnitFactor {
   double factor;
-  const char* words;
+  const char* words;       // of what is compared with the machine
+  const char* words_here;  // of trials that are compared with the others
 };
-constexpr UnitFactor unit_factors[]{{180 / std::numbers::pi, "degrees where the machine has radians"},
-                                    {std::numbers::pi / 180, "radians where the machine has degrees"},
-                                    {1000, "thousandths of the machine's unit"},
-                                    {0.001, "thousands of the machine's unit"}};
+constexpr UnitFactor unit_factors[]{
+    {180 / std::numbers::pi, "degrees where the machine has radians", "degrees where the others are in radians"},
+    {std::numbers::pi / 180, "radians where the machine has degrees", "radians where the others are in degrees"},
+    {1000, "thousandths of the machine's unit", "thousandths of the others' unit"},
+    {0.001, "thousands of the machine's unit", "thousands of the others' unit"}};
 constexpr double values_apart = 0.15, scatters_apart = 0.5;  // of logarithms; scatter is known roughly
 constexpr double same_share = 1e-6;                          // of the largest value of a state, asked for twice
+constexpr double trials_apart = 0.5;                         // of logarithms, of trials that start anywhere
+constexpr double trials_alike = 0.4;                         // of that factor's logarithm: spread of trials in one unit
 constexpr std::size_t fewest_for_units = 10;                 // rows
+constexpr std::size_t fewest_compared = 4, fewest_rows = 3;  // for trials to be compared; of a trial that stands still
 
 template <class Known>
 bool every_row(const MachineRuns& runs, Known known) {
@@ -48,6 +55,20 @@ void require_shape(const Machine& machine, const MachineRuns& runs) {
       if (steps && !std::ranges::all_of(row.inputs, [](double x) { return std::isfinite(x); }))
         throw std::invalid_argument(fmt::format("trial {}: an input is not a finite number", runs.name_of(t)));
     }
+}
+
+// Rows whose time is not known are passed over.
+void require_clock(const MachineRuns& runs) {
+  for (std::size_t t = 0; t < runs.trials.size(); ++t) {
+    double latest = -std::numeric_limits<double>::infinity();
+    for (const MachineRow& row : runs.trials[t].rows) {
+      if (row.time < latest)
+        throw std::invalid_argument(fmt::format("time_s: it runs back in trial {}, row {}: {} comes after {}",
+                                                runs.name_of(t), &row - runs.trials[t].rows.data() + 1, row.time,
+                                                latest));
+      if (!std::isnan(row.time)) latest = row.time;
+    }
+  }
 }
 
 void require_launch(const Machine& machine, const MachineRuns& runs) {
@@ -101,6 +122,118 @@ std::vector<std::string> doubled_trials(const MachineRuns& runs) {
   if (doubled == 0) return {};
   return {fmt::format("{} of {} trials are there twice, number by number: was one set of data brought in twice?",
                       doubled, runs.trials.size())};
+}
+
+// Names some trials: how many, of how many, and one of them.
+std::string named_trials(const MachineRuns& runs, const std::vector<std::size_t>& some) {
+  if (some.size() == 1) return "trial " + runs.name_of(some.front());
+  return fmt::format("{} of {} trials (as {})", some.size(), runs.trials.size(), runs.name_of(some.front()));
+}
+
+// What a column holds, by trial; missing values are left out.
+struct TrialColumn {
+  std::string name;
+  std::vector<std::vector<double>> values;
+};
+
+std::vector<TrialColumn> trial_columns(const MachineRuns& runs, const std::vector<std::string>& names,
+                                       std::vector<double> MachineRow::*which) {
+  std::vector<TrialColumn> all;
+  for (std::size_t j = 0; j < names.size(); ++j) {
+    all.push_back({names[j], std::vector<std::vector<double>>(runs.trials.size())});
+    for (std::size_t t = 0; t < runs.trials.size(); ++t)
+      for (const MachineRow& row : runs.trials[t].rows)
+        if (std::isfinite((row.*which)[j])) all.back().values[t].push_back((row.*which)[j]);
+  }
+  return all;
+}
+
+bool stands_still(const std::vector<double>& values) {
+  return std::ranges::adjacent_find(values, std::not_equal_to()) == values.end();
+}
+
+// A column may be constant in all trials, as a mass is; one that is so in a few of them has lost its sensor there.
+std::vector<std::string> stuck_trials(const MachineRuns& runs, const TrialColumn& column) {
+  std::vector<std::size_t> stuck;
+  std::size_t told = 0;
+  for (std::size_t t = 0; t < runs.trials.size(); ++t) {
+    if (column.values[t].size() < fewest_rows) continue;
+    ++told;
+    if (stands_still(column.values[t])) stuck.push_back(t);
+  }
+  if (stuck.empty() || 2 * stuck.size() > told) return {};
+  return {fmt::format("{}: it is {} in every row of {}: did its sensor stand still?", column.name,
+                      column.values[stuck.front()].front(), named_trials(runs, stuck))};
+}
+
+// Two heaps of trials by the size of a column in them.
+struct TrialHeaps {
+  std::vector<std::size_t> few;  // trials of the smaller heap
+  double apart = 0;              // logarithm of their size over that of the others
+  double spread = 0;             // of logarithms within a heap
+};
+
+// Splits trials at the widest gap between their sizes. @param sizes  logarithm and trial, two or more
+TrialHeaps heaps_of(std::vector<std::pair<double, std::size_t>> sizes) {
+  std::ranges::sort(sizes);
+  std::size_t upper = 1;  // where the upper heap begins
+  for (std::size_t i = 1; i < sizes.size(); ++i)
+    if (sizes[i].first - sizes[i - 1].first > sizes[upper].first - sizes[upper - 1].first) upper = i;
+  const bool few_above = 2 * upper >= sizes.size();
+  const double step = sizes[(upper + sizes.size()) / 2].first - sizes[upper / 2].first;
+  TrialHeaps heaps{{},
+                   few_above ? step : -step,
+                   std::max(sizes[upper - 1].first - sizes.front().first, sizes.back().first - sizes[upper].first)};
+  for (std::size_t i = few_above ? upper : 0; i < (few_above ? sizes.size() : upper); ++i)
+    heaps.few.push_back(sizes[i].second);
+  std::ranges::sort(heaps.few);
+  return heaps;
+}
+
+// Trials of one machine differ in size by far less than units do: where the sizes fall into two heaps that are a unit's
+// factor apart, the smaller heap may be in another unit.
+std::vector<std::string> trials_in_other_units(const MachineRuns& runs, const TrialColumn& column) {
+  for (const bool first : {false, true}) {  // A trial's first value does not hang on what its machine does next.
+    std::vector<std::pair<double, std::size_t>> sizes;
+    for (std::size_t t = 0; t < runs.trials.size(); ++t) {
+      std::vector<double> values = column.values[t];
+      for (double& one : values) one = std::abs(one);
+      if (values.empty()) continue;
+      const double size = first ? values.front() : median(std::move(values));
+      if (size > 0) sizes.emplace_back(std::log(size), t);
+    }
+    if (sizes.size() < fewest_compared) continue;
+    const TrialHeaps heaps = heaps_of(std::move(sizes));
+    for (const UnitFactor& unit : unit_factors)
+      if (std::abs(heaps.apart - std::log(unit.factor)) < trials_apart &&
+          heaps.spread < trials_alike * std::abs(heaps.apart))
+        return {fmt::format("{}: its {} in {} are {:.4g} times those of the others: {} in {}?", column.name,
+                            first ? "first values" : "values", named_trials(runs, heaps.few), std::exp(heaps.apart),
+                            heaps.few.size() == 1 ? "is it" : "are these", unit.words_here)};
+  }
+  return {};
+}
+
+// Looks at every column trial by trial, without the machine.
+std::vector<std::string> odd_trials(const Machine& machine, const MachineRuns& runs) {
+  std::vector<std::string> states, said;
+  for (const MachineSensor& sensor : machine.observe) states.push_back(sensor.state);
+  const auto add = [&](std::vector<std::string> sentences) {
+    for (std::string& sentence : sentences) said.push_back(std::move(sentence));
+  };
+  for (const TrialColumn& column : trial_columns(runs, states, &MachineRow::seen)) {
+    add(stuck_trials(runs, column));
+    add(trials_in_other_units(runs, column));
+  }
+  for (const TrialColumn& column : trial_columns(runs, machine.inputs, &MachineRow::inputs)) {
+    add(trials_in_other_units(runs, column));
+    std::vector<double> all;
+    for (const std::vector<double>& values : column.values) all.insert(all.end(), values.begin(), values.end());
+    if (all.size() >= fewest_rows && stands_still(all))
+      said.push_back(fmt::format("{}: it is {} in every row: an input that is constant does not show what it does",
+                                 column.name, all.front()));
+  }
+  return said;
 }
 
 // The measured rows from which the next one is known, as the nominal map takes them.
@@ -250,6 +383,7 @@ ColumnSpread column_spread(const MachineRuns& runs, std::size_t sensor) {
 std::vector<std::string> look_over(const Machine& machine, const MachineRuns& runs) {
   machine.require_valid();
   require_shape(machine, runs);
+  require_clock(runs);
   const std::size_t transitions = runs.transitions();
   if (transitions == 0)
     throw std::invalid_argument("runs: no trial has two rows one after the other: there is no transition");
@@ -275,6 +409,7 @@ std::vector<std::string> look_over(const Machine& machine, const MachineRuns& ru
   require_same_again(machine, from);
   for (std::string& sentence : doubled_trials(runs)) said.push_back(std::move(sentence));
   for (std::string& sentence : other_units(machine, from)) said.push_back(std::move(sentence));
+  for (std::string& sentence : odd_trials(machine, runs)) said.push_back(std::move(sentence));
   return said;
 }
 

@@ -52,7 +52,7 @@ class MachineStepper {
   /// Adds a point. @param point  [size()] @param fresh  [scores()] normal scores of this step
   void add(const TransitionPlace& place, const Eigen::Ref<const Eigen::VectorXd>& point,
            const Eigen::Ref<const Eigen::VectorXd>& fresh);
-  /// Steps all points added. A state that is not finite counts as failed.
+  /// Steps all points added. A state that has grown beyond all numbers counts as failed.
   void run();
   /// Steps some of the points added, given by their numbers from 0. The next states of the others stay as they are; a
   /// point that was neither stepped nor told has none.

@@ -315,7 +315,7 @@ std::vector<NamedValue> MachineTransitions::report_nuisances(std::span<const dou
 }  // namespace
 
 std::unique_ptr<TransitionModel> machine_transitions(std::shared_ptr<const Machine> machine, MachineRuns runs) {
-  return std::make_unique<MachineTransitions>(std::move(machine), std::move(runs));
+  return std::make_unique<MachineTransitions>(refusing_nan(std::move(machine)), std::move(runs));
 }
 
 }  // namespace metastable::analysis

@@ -51,7 +51,7 @@ namespace metastable::analysis {
 /// the errors of sensors whose sd is not stated, and the share of wild rows. Effects are those of machine_effects().
 /// The map is called with many states at once, from several threads at once.
 /// @throws std::invalid_argument as Machine::require_valid(), look_over(), score_plan(); where a measured state has
-///   neither noise nor an error of measurement
+///   neither noise nor an error of measurement; here and in every later call as the step of refusing_nan()
 std::unique_ptr<TransitionModel> machine_transitions(std::shared_ptr<const Machine> machine, MachineRuns runs);
 
 }  // namespace metastable::analysis

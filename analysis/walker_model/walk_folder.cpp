@@ -6,7 +6,6 @@
 #include <array>
 #include <cmath>
 #include <map>
-#include <ranges>
 #include <span>
 #include <stdexcept>
 
@@ -34,6 +33,16 @@ constexpr dynamics::Range rates{.low = -30, .high = 30};  // [rad/s]: ten times 
 
 std::string file_in(const ExperimentSource& source, const char* name) {
   return (std::filesystem::path(source.folder) / name).string();
+}
+
+// Says alone that no walker, or an unknown one, is stated: which states are measured depends on it, so that what else
+// is wrong may only seem so.
+void require_model(const Defects& defects) {
+  for (const std::string& line : defects.lines())
+    if (line.find("machine.model") != std::string::npos)
+      throw InputError({line +
+                        "; write model = \"compass\" or model = \"simplest\" below [machine], and bring walks of a "
+                        "simulator of your own from Python, as metastable.machine() and metastable.runs()"});
 }
 
 // Reads steps.csv, and trials.csv, of walks.
@@ -193,6 +202,17 @@ WalkerStatement drawn_walker(const WalkerSetting& setting) {
   return statement;
 }
 
+// Returns what the catalogue tells of an effect, with this walker's bounds and units.
+dynamics::EffectInfo info_of(Walker walker, const MachineEffect& effect) {
+  dynamics::EffectInfo info = dynamics::walker_effect_info(effect.id);
+  for (std::size_t p = 0; p < effect.parameters.size(); ++p) {
+    info.parameters[p].lower = effect.parameters[p].lower;
+    info.parameters[p].upper = effect.parameters[p].upper;
+    if (walker == Walker::simplest) info.parameters[p].unit.clear();  // it has units of its own
+  }
+  return info;
+}
+
 // Returns the machine's values with those of the effects.
 std::vector<double> values_with(const Machine& machine, const std::vector<std::pair<std::string, double>>& effects) {
   std::vector<double> values;
@@ -241,6 +261,11 @@ std::optional<Walks> parse_walks(const ExperimentSource& source) {
   Defects defects;
   const auto told = parse_walk_toml(file_in(source, "experiment.toml"), source.experiment_toml, defects);
   if (!told && !(source.steps_csv && !source.collisions_csv)) return std::nullopt;
+  if (told && source.collisions_csv)
+    throw InputError({file_in(source, "collisions.csv") +
+                      ": collisions are a wheel's, but experiment.toml states walks, whose rows are in steps.csv: give "
+                      "each machine a folder of its own"});
+  if (told) require_model(defects);
   defects.check();
   if (!told) return std::nullopt;
   WalkerStatement statement;
@@ -270,10 +295,7 @@ std::optional<Walks> parse_walks(const ExperimentSource& source) {
 Diagnosis diagnose_walks(const Walks& walks, const DiagnosisOptions& options) {
   if (!options.elsewhere.empty()) throw std::invalid_argument("--at-slope, --at-speed: have no meaning with walks");
   std::shared_ptr<const TransitionModel> model = machine_transitions(walks.machine, walks.runs);
-  const std::vector<std::string> known = model->effect_ids();
-  for (const std::string& entry : options.catalogue)
-    for (const auto id : std::views::split(entry, '+'))
-      require_word("catalogue", std::string_view(id.begin(), id.end()), known);
+  require_effects(options.catalogue, model->effect_ids());
   return diagnose(std::move(model), options);
 }
 
@@ -300,6 +322,31 @@ std::string walk_toml(const WalkStatement& statement) {
   return text;
 }
 
+std::vector<dynamics::EffectInfo> effects_known_to(Walker walker) {
+  WalkerSetting setting;
+  setting.walker = walker;
+  setting.slope_deg = walker_slope_deg(walker);
+  const Machine machine = walker_machine(drawn_walker(setting)),
+                compass = walker_machine(drawn_walker(WalkerSetting()));
+  const auto has = [](const Machine& one, const std::string& id) {
+    return std::ranges::find(one.effects, id, &MachineEffect::id) != one.effects.end();
+  };
+  const auto of_another_state = [&](const std::string& id) {
+    return std::ranges::any_of(compass.states, [&](const std::string& state) {
+      return id.ends_with(state) && std::ranges::find(machine.states, state) == machine.states.end();
+    });
+  };
+  std::vector<dynamics::EffectInfo> all;
+  for (const dynamics::EffectInfo& info : dynamics::walker_effects()) {
+    if (of_another_state(info.id)) continue;
+    if (has(machine, info.id))
+      all.push_back(info_of(setting.walker, *std::ranges::find(machine.effects, info.id, &MachineEffect::id)));
+    else if (!has(compass, info.id))
+      all.push_back(info);  // any machine may have it
+  }
+  return all;
+}
+
 std::vector<std::pair<std::string, double>> effects_of_walks(WalkerSetting setting,
                                                              const std::vector<std::string>& texts) {
   setting.terrain = dynamics::Terrain::fresh;
@@ -311,13 +358,7 @@ std::vector<std::pair<std::string, double>> effects_of_walks(WalkerSetting setti
     const std::string id = text.substr(0, text.find(':'));
     require_word("--effect", id, known);
     const MachineEffect& effect = *std::ranges::find(effects, id, &MachineEffect::id);
-    dynamics::EffectInfo info = dynamics::walker_effect_info(id);
-    for (std::size_t p = 0; p < effect.parameters.size(); ++p) {
-      info.parameters[p].lower = effect.parameters[p].lower;
-      info.parameters[p].upper = effect.parameters[p].upper;
-      if (setting.walker == Walker::simplest) info.parameters[p].unit.clear();  // it has units of its own
-    }
-    const dynamics::Effect read = dynamics::effect_from_text(text, {}, info);
+    const dynamics::Effect read = dynamics::effect_from_text(text, {}, info_of(setting.walker, effect));
     for (std::size_t p = 0; p < effect.parameters.size(); ++p)
       values.emplace_back(id + "." + effect.parameters[p].name, read.values[p]);
   }

@@ -13,6 +13,7 @@
 #include "analysis/machine_model/machine_runs.h"
 #include "analysis/walker_model/walker_machine.h"
 #include "analysis/walkers/walker_trials.h"
+#include "dynamics/catalogue/effect_catalogue.h"
 
 namespace metastable::analysis {
 
@@ -32,7 +33,8 @@ bool states_walks(const std::string& experiment_toml);
 /// Reads a folder whose experiment.toml states `system = "machine"`; nothing where it states another.
 /// Checks names, types and ranges of keys and columns, steps of a trial in order without gap, trials that stand
 /// together, and outcomes of those trials only.
-/// @throws InputError with the first 20 defects, each with file, line and column
+/// @throws InputError with the first 20 defects, each with file, line and column; with one alone where the model of the
+/// walker is missing or unknown, or where collisions.csv is there, too
 std::optional<Walks> read_walks(const std::filesystem::path& folder);
 /// Reads it from the texts of its files.
 std::optional<Walks> parse_walks(const ExperimentSource& source);
@@ -59,6 +61,10 @@ std::string walk_toml(const WalkStatement& statement);
 
 /// Returns the texts as a folder of that name holds them.
 ExperimentSource source_of(const WalkFiles& files, const std::string& name);
+
+/// Lists the effects of walks that a walker may have, with its own bounds. Effects of the simplest walker's body have
+/// no units: its lengths are in legs, its times in sqrt(l/g). @throws std::invalid_argument for the biped
+std::vector<dynamics::EffectInfo> effects_known_to(Walker walker);
 
 /// Reads effects of a walker that walks are drawn from, "hip_damping:damping=0.3", as draw_walks() takes them.
 /// @throws std::invalid_argument as dynamics::effect_from_text(), and for an id that the machine does not have

@@ -244,9 +244,21 @@ Command lessons() {
 }
 
 Command effects() {
-  return {"effects", "The catalogue of effects a model may lack: parameters, units, ranges, meaning",
-          [](Options& o) { o.add_json(); },
-          [](const Options& o, const std::string&) { run_effects({o.text("json")}); }};
+  return {"effects",
+          "The catalogue of effects a model may lack: parameters, units, ranges, meaning",
+          [](Options& o) {
+            o.add("walker", "simplest|compass", "",
+                  "Effects of walks of a walker on two legs, not of the wheel's trials");
+            o.add_json();
+          },
+          [](const Options& o, const std::string&) {
+            const EffectsRequest request{o.text("json")};
+            if (!o.given("walker")) return run_effects(request);
+            analysis::require_word("--walker", o.text("walker"), {"simplest", "compass"});
+            run_walker_effects(request, analysis::walker_from_name(o.text("walker")));
+          },
+          "",
+          {"metastable effects", "metastable effects --walker compass"}};
 }
 
 }  // namespace

@@ -297,9 +297,11 @@ std::string diagnosis_json(const analysis::Diagnosis& d, const Provenance& prove
   return json.dump(2) + "\n";
 }
 
-std::string effects_json() {
+std::string effects_json() { return effects_json(dynamics::effect_catalogue(), ""); }
+
+std::string effects_json(const std::vector<dynamics::EffectInfo>& all, const std::string& walker) {
   Json list = Json::array();
-  for (const dynamics::EffectInfo& info : dynamics::effect_catalogue()) {
+  for (const dynamics::EffectInfo& info : all) {
     Json parameters = Json::array();
     for (const dynamics::EffectParameter& p : info.parameters)
       parameters.push_back({{"name", p.name},
@@ -312,7 +314,10 @@ std::string effects_json() {
                             {"meaning", p.meaning}});
     list.push_back({{"id", info.id}, {"summary", info.summary}, {"parameters", parameters}});
   }
-  return Json{{"schema", 1}, {"effects", list}}.dump(2) + "\n";
+  Json json{{"schema", 1}};
+  if (!walker.empty()) json["walker"] = walker;
+  json["effects"] = std::move(list);
+  return json.dump(2) + "\n";
 }
 
 }  // namespace metastable::reports

@@ -2,8 +2,10 @@
 // Writes a diagnosis and the catalogue of effects as JSON.
 
 #include <string>
+#include <vector>
 
 #include "analysis/diagnosis/diagnosis.h"
+#include "dynamics/catalogue/effect_catalogue.h"
 #include "reports/output/table.h"
 
 namespace metastable::reports {
@@ -14,5 +16,7 @@ std::string diagnosis_json(const analysis::Diagnosis& diagnosis, const Provenanc
 
 /// Writes `effects`' result: id, summary and parameters (name, unit, neutral, lower, upper, meaning) of each effect.
 std::string effects_json();
+/// Does the same for effects of a walker, which stands under the key "walker"; empty: the wheel's.
+std::string effects_json(const std::vector<dynamics::EffectInfo>& all, const std::string& walker);
 
 }  // namespace metastable::reports

@@ -255,7 +255,7 @@ void add_experiments(py::module_& module) {
   module.def("simulate", simulate);
   module.def("diagnose", diagnose);
   module.def("describe", describe);
-  module.def("effects_json", effects_json);
+  module.def("effects_json", [] { return effects_json(); });
 }
 
 }  // namespace metastable::reports::python

@@ -4,7 +4,6 @@
 
 #include <memory>
 #include <optional>
-#include <ranges>
 #include <stdexcept>
 #include <string_view>
 #include <utility>
@@ -47,22 +46,36 @@ std::vector<analysis::MachineEffect> effects_of(const py::dict& fields) {
   return all;
 }
 
+// Refuses a step that changed the values it was given: it would be asked for one machine and answer for another.
+void require_untouched(const py::dict& values, const std::vector<std::string>& names,
+                       const std::vector<py::object>& given) {
+  for (std::size_t v = 0; v < names.size(); ++v)
+    if (!values.contains(names[v].c_str()) || !py::object(values[names[v].c_str()]).is(given[v]))
+      throw py::value_error(
+          fmt::format("step: it writes into p, whose \"{}\" is not what it was given any more", names[v]));
+  if (values.size() != names.size())
+    throw py::value_error("step: it writes into p, which has names that it was not given");
+}
+
 // Asks the step map of a machine, with its values by name.
 void ask_step(const py::object& step, const std::vector<std::string>& names, const analysis::MachineBatch& batch) {
   py::dict values;
+  std::vector<py::object> given;
   for (std::size_t v = 0; v < names.size(); ++v) {
     const std::span<const double> one = batch.values[v];
     if (one.size() == 1) {
-      values[names[v].c_str()] = one[0];
+      given.emplace_back(py::float_(one[0]));
     } else {
       py::array_t<double> array(static_cast<py::ssize_t>(one.size()), one.data());
       array.attr("setflags")(py::arg("write") = false);
-      values[names[v].c_str()] = array;
+      given.push_back(std::move(array));
     }
+    values[names[v].c_str()] = given.back();
   }
-  take_step(
-      call_step([&] { return step(rows_of(batch.states, batch.rows), rows_of(batch.scores, batch.rows), values); }),
-      batch.rows, batch.next, batch.failed);
+  const py::object returned =
+      call_step([&] { return step(rows_of(batch.states, batch.rows), rows_of(batch.scores, batch.rows), values); });
+  require_untouched(values, names, given);
+  take_step(returned, batch.rows, batch.next, batch.failed);
 }
 
 std::shared_ptr<analysis::Machine> machine_of(const py::dict& fields) {
@@ -153,10 +166,7 @@ py::dict diagnose_machine(const py::dict& machine_fields, const py::dict& runs_f
   study.progress = [&](double share, const std::string& doing) { call.tell(share, doing); };
   call.run([&] {
     std::shared_ptr<const analysis::TransitionModel> model = analysis::machine_transitions(machine, std::move(runs));
-    const std::vector<std::string> known = model->effect_ids();
-    for (const std::string& entry : study.catalogue)
-      for (const auto id : std::views::split(entry, '+'))
-        analysis::require_word("catalogue", std::string_view(id.begin(), id.end()), known);
+    analysis::require_effects(study.catalogue, model->effect_ids());
     found = analysis::diagnose(std::move(model), study);
     figures = notebook_figures(found);
   });

@@ -59,6 +59,13 @@ py::object call_step(const std::function<py::object()>& step) {
     if (error.matches(PyExc_ValueError) && said.find("read-only") != std::string::npos)
       py::raise_from(error, PyExc_ValueError,
                      ("step: it writes into a read-only array, as its arguments are (" + said + ")").c_str());
+    else if (error.matches(PyExc_ValueError) && said.starts_with("The truth value of an array"))
+      py::raise_from(
+          error, PyExc_ValueError,
+          ("step: it asks whether an array is true, but states, noise and parameters are arrays of one number "
+           "a row, so that numpy.where has to take the place of if (" +
+           said + ")")
+              .c_str());
     else
       throw;
     throw py::error_already_set();

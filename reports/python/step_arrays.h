@@ -15,7 +15,8 @@ namespace py = pybind11;
 /// Returns numbers of one kind in rows; Python may keep them, and may not write into them.
 py::array_t<double> rows_of(std::span<const double> values, std::size_t rows);
 
-/// Returns what a step returns. @throws what it throws; ValueError saying so where it writes into its arguments
+/// Returns what a step returns. @throws what it throws; ValueError saying so where it writes into its arguments, or
+/// asks whether an array is true
 py::object call_step(const std::function<py::object()>& step);
 
 /// Copies what a step returned: (next states [rows x dimension], failed [rows]).

@@ -67,7 +67,8 @@ class Machine:
         """Its nominal model as a Walker, for study() and simulate().
 
         start   the state that walks begin from; None: the means of `launch`
-        values  of parameters and of the effects' parameters that differ from the nominal and the neutral ones
+        values  of parameters and of the effects' parameters that differ from the nominal and the neutral ones, within
+                their bounds
         """
         nominal = {name: value[0] for name, value in self.parameters.items()}
         for parameters in self.effects.values():
@@ -82,9 +83,23 @@ class Machine:
             if missing:
                 raise InputError(f"walker: start: launch has no {missing[0]}: give the state that walks begin from")
             start = [self.launch[state][0] for state in self.states]
-        nominal.update(values)
-        return metastable.walker(lambda state, noise: self.step(state, noise, nominal), len(self.states), self.noise,
+        bounds = {name: (value[2:], name) for name, value in self.parameters.items()}
+        for effect, parameters in self.effects.items():
+            bounds.update({name: (value[1:], f"{effect}: {name}") for name, value in parameters.items()})
+        for name, value in values.items():
+            (lower, upper), what = bounds[name]
+            nominal[name] = _row_of_numbers(value, 1, 1, f"walker: {what}")[0]
+            if not math.isfinite(nominal[name]) or not lower <= nominal[name] <= upper:
+                raise InputError(f"walker: {what}: {nominal[name]:g} is outside its bounds [{lower:g}, {upper:g}]")
+        return metastable.walker(lambda state, noise: self._step_with(nominal, state, noise), len(self.states), self.noise,
                                  start=start, names=self.states, name=self.name)
+
+    def _step_with(self, values, state, noise):
+        given = dict(values)
+        returned = self.step(state, noise, given)
+        if len(given) != len(values) or any(given.get(name) is not value for name, value in values.items()):
+            raise InputError("step: it writes into p, which it may only read")
+        return returned
 
     def __repr__(self):
         return (f"<metastable.Machine: {self.name}, states {', '.join(self.states)}, {self.noise} noise, "
@@ -239,7 +254,7 @@ def machine(step, *, states, noise, parameters, effects={}, may_vary=(), sensor=
                 array of independent standard normal numbers, `p` maps every name of a parameter, of an effect's parameter
                 and of an input to a number or to an array of n, so that it has to be written for both; `next` are the
                 (n, states) states one step on, `failed` n booleans. It must be a function of its arguments alone and may
-                not write into them. States that make no sense have failed.
+                not write into them. States that make no sense have failed; a NaN that is not marked so is refused.
     states      names of the numbers of a state, 1 to 30
     noise       numbers of noise a step, 1 to 16
     parameters  name -> (nominal, sd[, lower, upper]): the value, and the sd with which it is known; a recalibration refits

@@ -5,8 +5,12 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <numbers>
+#include <stdexcept>
+#include <string>
 
 #include "tests/analysis/machine_model/machines.h"
+#include "tests/message_of.h"
 
 namespace metastable::analysis::test {
 namespace {
@@ -18,6 +22,88 @@ TEST(MachineRunsColumn, FarFromZeroKeepsItsSpread) {
   for (const double x : {1e9 - 1, 1e9, missing, 1e9 + 1}) runs.trials[0].rows.push_back({.seen = {x}});
   EXPECT_DOUBLE_EQ(column_spread(runs, 0).mean, 1e9);
   EXPECT_DOUBLE_EQ(column_spread(runs, 0).sd, std::sqrt(2.0 / 3));
+}
+
+class LookedOver : public ::testing::Test {
+ protected:
+  LookedOver() {
+    machine_.inputs = {"warmth"};
+    for (std::size_t t = 0; t < runs_.trials.size(); ++t)
+      for (std::size_t k = 0; k < runs_.trials[t].rows.size(); ++k)
+        runs_.trials[t].rows[k].inputs = {20 + 0.1 * static_cast<double>((3 * t + k) % 7)};
+  }
+
+  // Multiplies a column in the trials from `first` to the one before `end`.
+  void scale(std::vector<double> MachineRow::*column, double factor, std::size_t first, std::size_t end) {
+    for (std::size_t t = first; t < end; ++t)
+      for (MachineRow& row : runs_.trials[t].rows) (row.*column)[0] *= factor;
+  }
+  std::string said() const {
+    std::string all;
+    for (const std::string& sentence : look_over(machine_, runs_)) all += sentence + "\n";
+    return all;
+  }
+
+  Machine machine_ = linear_machine(0.05);
+  MachineRuns runs_ =
+      scalar_runs(20, 12, 1.5, 0.05, 3, [](double x, double z, std::size_t) { return 0.8 * x + 0.3 + 0.2 * z; });
+};
+
+TEST_F(LookedOver, NothingIsSaidOfRunsAsTheyShouldBe) { EXPECT_EQ(said(), ""); }
+
+TEST_F(LookedOver, OneTrialInDegreesIsSuspected) {
+  scale(&MachineRow::seen, 180 / std::numbers::pi, 4, 5);
+  EXPECT_NE(said().find("x: its values in trial 5 are "), std::string::npos) << said();
+  EXPECT_NE(said().find("those of the others: is it in degrees where the others are in radians?"), std::string::npos)
+      << said();
+}
+
+TEST_F(LookedOver, HalfOfTheTrialsInDegreesAreSuspected) {
+  scale(&MachineRow::seen, 180 / std::numbers::pi, 10, 20);
+  EXPECT_NE(said().find("x: its values in 10 of 20 trials (as 11) are "), std::string::npos) << said();
+}
+
+// The median of a trial of another machine is another one, too: its first values tell of the unit alone.
+TEST_F(LookedOver, TrialsOfAnotherMachineInDegreesAreSuspectedByWhereTheyBegin) {
+  for (std::size_t t = 10; t < 20; ++t)
+    for (std::size_t k = 0; k < 12; ++k)
+      runs_.trials[t].rows[k].seen[0] *= 180 / std::numbers::pi * std::pow(0.5, static_cast<double>(k));
+  EXPECT_NE(said().find("x: its first values in 10 of 20 trials (as 11) are "), std::string::npos) << said();
+}
+
+TEST_F(LookedOver, AnInputInAnotherUnitIsSuspected) {
+  scale(&MachineRow::inputs, 0.001, 0, 3);
+  EXPECT_NE(said().find("warmth: its values in 3 of 20 trials (as 1) are 0.001 times those of the others: are these in "
+                        "thousands of the others' unit?"),
+            std::string::npos)
+      << said();
+}
+
+TEST_F(LookedOver, TrialsThatDifferByNoUnitAreNot) {
+  scale(&MachineRow::seen, 5, 4, 5);
+  scale(&MachineRow::inputs, 10, 10, 20);
+  EXPECT_EQ(said().find("the others"), std::string::npos) << said();
+}
+
+TEST_F(LookedOver, ATrialThatStandsStillIsNamed) {
+  for (MachineRow& row : runs_.trials[3].rows) row.seen = {1.25};
+  EXPECT_NE(said().find("x: it is 1.25 in every row of trial 4: did its sensor stand still?"), std::string::npos)
+      << said();
+}
+
+TEST_F(LookedOver, AnInputThatIsConstantIsNamed) {
+  for (MachineTrial& trial : runs_.trials)
+    for (MachineRow& row : trial.rows) row.inputs = {20};
+  EXPECT_EQ(said(), "warmth: it is 20 in every row: an input that is constant does not show what it does\n");
+}
+
+TEST_F(LookedOver, TimeThatRunsBackIsRefused) {
+  for (std::size_t k = 0; k < 12; ++k) runs_.trials[2].rows[k].time = 0.5 * static_cast<double>(k);
+  runs_.trials[2].rows[4].time = missing;
+  EXPECT_EQ(said(), "");
+  runs_.trials[2].rows[5].time = 1.25;
+  EXPECT_EQ(message_of<std::invalid_argument>([&] { said(); }),
+            "time_s: it runs back in trial 3, row 6: 1.25 comes after 1.5");
 }
 
 }  // namespace

@@ -1,13 +1,21 @@
-// Works side by side ask a machine's map in joint calls, and are told what they would be told alone.
+// Works side by side ask a machine's map in joint calls, and are told what they would be told alone; what no machine is
+// is refused.
 
 #include "analysis/machine_model/machine.h"
 
 #include <gtest/gtest.h>
 
 #include <atomic>
+#include <cmath>
+#include <cstdint>
+#include <limits>
 #include <memory>
+#include <span>
 #include <stdexcept>
+#include <string>
 #include <vector>
+
+#include "tests/message_of.h"
 
 namespace metastable::analysis::test {
 namespace {
@@ -78,6 +86,55 @@ TEST(JoiningSteps, AWorkThatThrowsEndsTheOthers) {
                               walk(joining, 1, 5);
                             }),
                std::domain_error);
+}
+
+// Returns sqrt(2 - z) x and what is said of a NaN in it, from these states and scores.
+std::string said_of(std::vector<double> states, const std::vector<double>& scores, bool marks) {
+  auto machine = std::make_shared<Machine>();
+  machine->states = {"x"};
+  machine->parameters = {{"room", 2, 0.1}};
+  machine->step = [marks](const MachineBatch& batch) {
+    for (std::size_t i = 0; i < batch.rows; ++i) {
+      batch.next[i] = std::sqrt(batch.value(0, i) - batch.scores[i]) * batch.states[i];
+      batch.failed[i] = marks && std::isnan(batch.next[i]);
+    }
+  };
+  std::vector<double> next(states.size());
+  std::vector<std::uint8_t> failed(states.size());
+  const std::vector<double> room{2};
+  const std::vector<std::span<const double>> values{room};
+  return message_of<std::invalid_argument>([&] {
+    refusing_nan(machine)->step({states.size(), states, scores, values, next, failed});
+  });
+}
+
+TEST(RefusingNan, NamesStateRowAndValues) {
+  EXPECT_EQ(said_of({1, 3}, {0, 2.5}, false),
+            "step: the next x is NaN, and not marked as failed, from x 3, noise 2.5, room 2: where there is no next "
+            "state, failed has to be true");
+}
+
+TEST(RefusingNan, LetsPassWhatIsMarkedAndWhatHasGrownBeyondAllBounds) {
+  const double infinity = std::numeric_limits<double>::infinity();
+  EXPECT_EQ(said_of({1, 3}, {0, 2.5}, true), "nothing was thrown");
+  EXPECT_EQ(said_of({1, infinity}, {0, 2.5}, false), "nothing was thrown");
+  EXPECT_EQ(said_of({1, 1e200}, {0, 2.5}, false), "nothing was thrown");
+}
+
+TEST(MachineBounds, ThatAreReversedAreCalledSo) {
+  Machine machine;
+  machine.states = {"x"};
+  machine.observe = {{"x", 0.1}};
+  machine.step = [](const MachineBatch&) {};
+  const auto refused = [&] { return message_of<std::invalid_argument>([&] { machine.require_valid(); }); };
+  EXPECT_EQ(refused(), "nothing was thrown");
+  machine.parameters = {{"a", 0.5, 0.1, 1, 0}};
+  EXPECT_EQ(refused(), "parameters: a: lower is above upper in its bounds [1, 0]");
+  machine.parameters = {{"a", 0.5, 0.1, 0.5, 0.5}};
+  EXPECT_EQ(refused(), "parameters: a: its bounds [0.5, 0.5] leave it no room");
+  machine.parameters = {};
+  machine.effects = {{"bend", {{"c", 0, 0.5, -0.5}}}};
+  EXPECT_EQ(refused(), "effects: bend: c: lower is above upper in its bounds [0.5, -0.5]");
 }
 
 }  // namespace

@@ -4,14 +4,18 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <filesystem>
 #include <fstream>
 #include <functional>
+#include <iterator>
+#include <set>
 #include <string>
 
 #include "analysis/experiment/input_error.h"
 #include "analysis/machine_model/machine_transitions.h"
 #include "analysis/walker_model/walker_experiment.h"
+#include "dynamics/catalogue/walker_effects.h"
 #include "tests/analysis/diagnosed.h"
 #include "tests/message_of.h"
 #include "tests/own_folder.h"
@@ -98,6 +102,44 @@ TEST_F(WalkFolder, WhatIsWrongIsNamedWithItsPlace) {
   has(with(&WalkFiles::steps_csv, "swing_rate_rad_s", "swing"), "swing");
   has(with(&WalkFiles::trials_csv, "stopped", "halted"), "'halted' is none of failed, stopped, lost");
   has(with(&WalkFiles::trials_csv, "\n6,", "\n7,"), "steps.csv has no trial 7");
+}
+
+TEST_F(WalkFolder, WithoutAKnownModelOneSentenceSaysWhatToWrite) {
+  for (const char* stated : {"model = \"none\"\n", ""}) {
+    WalkFiles files = drawn();
+    const std::string was = "model = \"compass\"\n";
+    files.experiment_toml.replace(files.experiment_toml.find(was), was.size(), stated);
+    write(files);
+    const std::string message = refused();
+    EXPECT_NE(message.find("write model = \"compass\" or model = \"simplest\" below [machine]"), std::string::npos)
+        << message;
+    EXPECT_EQ(message.find('\n'), std::string::npos) << message;
+  }
+}
+
+TEST_F(WalkFolder, CollisionsBesideStepsAreAnotherMachines) {
+  write(drawn());
+  put("collisions.csv", "trial,collision,speed_rad_s\n1,1,2\n");
+  const std::string message = refused();
+  EXPECT_NE(message.find("collisions.csv: collisions are a wheel's, but experiment.toml states walks"),
+            std::string::npos)
+      << message;
+  EXPECT_EQ(message.find('\n'), std::string::npos) << message;
+}
+
+TEST_F(WalkFolder, AWalkersEffectsAreThoseThatItsWalksMayHave) {
+  const auto ids = [](Walker walker) {
+    std::set<std::string> all;
+    for (const dynamics::EffectInfo& info : effects_known_to(walker)) all.insert(info.id);
+    return all;
+  };
+  std::set<std::string> lacks;
+  std::ranges::set_difference(ids(Walker::compass), ids(Walker::simplest), std::inserter(lacks, lacks.end()));
+  EXPECT_EQ(lacks, (std::set<std::string>{"leg_length", "leg_mass", "sensor_bias_swing_rate_rad_s",
+                                          "sensor_noise_swing_rate_rad_s"}));
+  EXPECT_EQ(ids(Walker::compass).size(), dynamics::walker_effects().size());
+  EXPECT_EQ(effects_known_to(Walker::simplest).front().parameters.front().upper, 2) << "its own bounds of hip_damping";
+  EXPECT_EQ(effects_known_to(Walker::simplest).front().parameters.front().unit, "");
 }
 
 TEST_F(WalkFolder, EffectsThatTheMachineLacksAreRefused) {

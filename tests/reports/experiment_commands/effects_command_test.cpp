@@ -21,5 +21,27 @@ TEST_F(EffectsCommand, ListsTheCatalogue) {
   EXPECT_EQ(nlohmann::json::parse(read(path("effects.json"))).at("schema"), 1);
 }
 
+TEST_F(EffectsCommand, ListsThoseOfWalks) {
+  const Ran compass = metastable({"effects", "--walker", "compass", "--json", path("effects.json")});
+  ASSERT_EQ(compass.code, 0) << compass.err;
+  EXPECT_NE(compass.out.find("hip_damping: the hip resists turning in proportion to its rate\n"), std::string::npos)
+      << compass.out;
+  EXPECT_NE(compass.out.find("(0.5 to 2, none at 1)"), std::string::npos) << "leg_mass\n" << compass.out;
+  EXPECT_EQ(compass.out.find("leg_contact"), std::string::npos) << "a wheel's";
+  const auto told = nlohmann::json::parse(read(path("effects.json")));
+  EXPECT_EQ(told.at("schema"), 1);
+  EXPECT_EQ(told.at("walker"), "compass");
+  EXPECT_EQ(told.at("effects").at(0).at("parameters").at(0).at("unit"), "N m s/rad");
+  const Ran simplest = metastable({"effects", "--walker", "simplest"});
+  ASSERT_EQ(simplest.code, 0) << simplest.err;
+  EXPECT_EQ(simplest.out.find("leg_mass"), std::string::npos) << simplest.out;
+}
+
+TEST_F(EffectsCommand, RefusesAWalkerWhoseWalksAreNotDiagnosed) {
+  const Ran ran = metastable({"effects", "--walker", "biped"});
+  EXPECT_EQ(ran.code, 2);
+  EXPECT_NE(ran.err.find("--walker: 'biped' is none of simplest, compass"), std::string::npos) << ran.err;
+}
+
 }  // namespace
 }  // namespace metastable::reports::test

@@ -138,11 +138,72 @@ class Refused(unittest.TestCase):
 
         self.check("next states of shape", asked(lambda s, z, p: (np.zeros((len(s), 2)), np.zeros(len(s), bool))), ValueError)
         self.check("(next states, failed) is to be returned", asked(lambda s, z, p: s), TypeError)
-        self.check("step: no finite state comes of trial 0, row 1", asked(lambda s, z, p: (s * np.nan, np.zeros(len(s), bool))))
+        self.check("step: no finite state comes of trial 0, row 1", asked(lambda s, z, p: (s + np.inf, np.zeros(len(s), bool))))
+        self.check("step: the next swing_rad is NaN, and not marked as failed, from swing_rad",
+                   asked(lambda s, z, p: (s * np.nan, np.zeros(len(s), bool))))
         self.check("step: it writes into a read-only array, as its arguments are", asked(writes), ValueError)
         drawn = np.random.default_rng(1)
         self.check("step: it makes something else of the same states", asked(
             lambda s, z, p: (p["decay"] * s + 0.01 * drawn.standard_normal(s.shape), np.zeros(len(s), bool))))
+
+    def test_a_step_that_knows_no_next_state_from_some_rows(self):
+        def for_noise_above(limit, marks):
+            def some(state, noise, p):
+                following, failed = step(state, noise, p)
+                lost = noise[:, 0] > limit
+                return np.where(lost[:, None], np.nan, following), failed | (lost & marks)
+            return some
+
+        def for_decay_above(state, noise, p):
+            following, failed = step(state, noise, p)
+            return np.where((np.broadcast_to(p["decay"], len(state)) > 0.976)[:, None], np.nan, following), failed
+
+        def asked(function):
+            return lambda: diagnosed(pendulum(step=function), trials=5)
+
+        for limit in (1, 3):
+            self.check("step: the next swing_rad is NaN, and not marked as failed, from swing_rad", asked(for_noise_above(limit, False)))
+        self.check(", decay 0.97", asked(for_decay_above))
+        self.assertIsNotNone(asked(for_noise_above(3, True))().verdict)
+
+    def test_a_step_that_writes_into_its_parameters(self):
+        def asked(function):
+            return lambda: diagnosed(pendulum(step=function), trials=5)
+
+        def changes(state, noise, p):
+            p["decay"] = 0.9
+            return step(state, noise, p)
+
+        def adds(state, noise, p):
+            p["mine"] = 1
+            return step(state, noise, p)
+
+        def takes(state, noise, p):
+            return step(state, noise, dict(p, loss_rad=p.pop("loss_rad")))
+
+        self.check("step: it writes into p, whose \"decay\" is not what it was given any more", asked(changes), ValueError)
+        self.check("step: it writes into p, which has names that it was not given", asked(adds), ValueError)
+        self.check("step: it writes into p, whose \"loss_rad\"", asked(takes), ValueError)
+        self.check("step: it writes into p, which it may only read",
+                   lambda: pendulum(step=changes).walker(start=[0.8]).study(simulated_steps=0))
+
+    def test_a_step_that_branches_on_a_parameter(self):
+        def branches(state, noise, p):
+            return step(state, noise, p) if p["decay"] > 0.5 else (state, np.ones(len(state), bool))
+
+        with self.assertRaisesRegex(ValueError, "step: it asks whether an array is true, but states, noise and parameters are "
+                                                "arrays of one number a row, .* \\(The truth value of an array"):
+            diagnosed(pendulum(step=branches), trials=5)
+
+    def test_values_out_of_bounds(self):
+        bounded = pendulum(parameters={"decay": (0.975, 0.01, 0, 1), "scatter_rad": (0.003, 0.003, 1e-5, 0.1)})
+        self.check("walker: decay: 2 is outside its bounds [0, 1]", lambda: bounded.walker(start=[0.8], decay=2))
+        self.check("walker: dry_friction: loss_rad: 5 is outside its bounds [0, 0.05]", lambda: bounded.walker(start=[0.8], loss_rad=5))
+        self.check("walker: decay: nan is outside its bounds [0, 1]", lambda: bounded.walker(start=[0.8], decay=np.nan))
+        self.check("walker: decay: numbers expected, not str", lambda: bounded.walker(start=[0.8], decay="much"), TypeError)
+        self.check("parameters: decay: lower is above upper in its bounds [1, 0]", lambda: pendulum(parameters={"decay": (0.9, 0.1, 1, 0)}))
+        self.check("effects: dry: loss_rad: lower is above upper in its bounds [0.05, 0]", lambda: pendulum(
+            effects={"dry": {"loss_rad": (0, 0.05, 0)}}))
 
     def test_runs_that_are_none(self):
         machine, data = pendulum(), swung(trials=5)
@@ -158,6 +219,8 @@ class Refused(unittest.TestCase):
         self.check("a column that is constant says nothing", lambda: metastable.diagnose(still, machine))
         few = metastable.runs(machine, trial=[1, 1], swing_rad=[0.8, 0.7])
         self.check("1 transition is fewer than the 2 parameters", lambda: metastable.diagnose(few, machine))
+        back = metastable.runs(machine, time_s=np.where(np.arange(120) == 30, -1, np.arange(120)), **data)
+        self.check("time_s: it runs back in trial 1, row 7: -1 comes after 29", lambda: metastable.diagnose(back, machine))
         apart = metastable.runs(machine, trial=[1, 2], swing_rad=[0.8, 0.7])
         self.check("there is no transition", lambda: metastable.diagnose(apart, machine))
         self.check("outcome: \"fell\" is none of failed, stopped, lost", lambda: metastable.diagnose(
@@ -178,6 +241,16 @@ class Refused(unittest.TestCase):
         machine, data = pendulum(), swung(trials=10)
         answer = metastable.diagnose(metastable.runs(machine, trial=data["trial"], swing_rad=np.degrees(data["swing_rad"])), machine)
         self.assertIn("is it in degrees where the machine has radians?", " ".join(answer.notes))
+
+    def test_some_trials_in_another_unit_are_suspected_aloud(self):
+        machine, data = pendulum(inputs=["warmth"]), swung(trials=10)
+        late, steady = data["trial"] >= 6, 20 + np.arange(240) % 7
+        runs = metastable.runs(machine, trial=data["trial"], swing_rad=np.where(late, np.degrees(data["swing_rad"]), data["swing_rad"]),
+                               inputs={"warmth": np.where(data["trial"] == 2, 1000 * steady, steady)})
+        notes = " ".join(metastable.diagnose(runs, machine, catalogue="dry_friction").notes)
+        self.assertRegex(notes, r"swing_rad: its values in 4 of 10 trials \(as 6\) are [56]\d\.?\d* times those of the others: "
+                                "are these in degrees where the others are in radians\\?")
+        self.assertIn("warmth: its values in trial 2 are 1000 times those of the others: is it in thousandths of the others' unit?", notes)
 
     def test_data_that_are_there_twice_are_noticed(self):
         machine, data = pendulum(), swung(trials=10)
