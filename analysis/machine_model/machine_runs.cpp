@@ -32,6 +32,7 @@ constexpr double values_apart = 0.15, scatters_apart = 0.5;  // of logarithms; s
 constexpr double same_share = 1e-6;                          // of the largest value of a state, asked for twice
 constexpr double trials_apart = 0.5;                         // of logarithms, of trials that start anywhere
 constexpr double trials_alike = 0.4;                         // of that factor's logarithm: spread of trials in one unit
+constexpr double launch_off = 4;                             // standard errors: one machine in 16000 by chance
 constexpr std::size_t fewest_for_units = 10;                 // rows
 constexpr std::size_t fewest_compared = 4, fewest_rows = 3;  // for trials to be compared; of a trial that stands still
 
@@ -212,6 +213,29 @@ std::vector<std::string> trials_in_other_units(const MachineRuns& runs, const Tr
                             heaps.few.size() == 1 ? "is it" : "are these", unit.words_here)};
   }
   return {};
+}
+
+// Holds the first rows against the launch that is stated: trials start from what was measured of them, so that nothing
+// else would tell.
+std::vector<std::string> other_launches(const Machine& machine, const MachineRuns& runs) {
+  std::vector<std::string> said;
+  for (const MachineLaunch& launch : machine.launches) {
+    const auto sensor = std::ranges::find(machine.observe, launch.state, &MachineSensor::state);
+    if (launch.assumed || sensor == machine.observe.end()) continue;
+    const auto column = static_cast<std::size_t>(sensor - machine.observe.begin());
+    double sum = 0, count = 0;
+    for (const MachineTrial& trial : runs.trials)
+      if (!trial.rows.empty() && std::isfinite(trial.rows.front().seen[column]))
+        sum += trial.rows.front().seen[column], ++count;
+    const double error = std::hypot(launch.sd, sensor->sd.value_or(0)) / std::sqrt(count);
+    const double off = std::abs(sum / count - launch.mean) / error;
+    if (count < static_cast<double>(fewest_compared) || !(error > 0) || !(off > launch_off)) continue;
+    said.push_back(fmt::format(
+        "launch: {} begins at {:.4g} in the mean of {:.0f} trials, and {:.4g} +- {:.3g} is stated: {:.0f} standard "
+        "errors off",
+        launch.state, sum / count, count, launch.mean, launch.sd, off));
+  }
+  return said;
 }
 
 // Looks at every column trial by trial, without the machine.
@@ -410,6 +434,7 @@ std::vector<std::string> look_over(const Machine& machine, const MachineRuns& ru
   for (std::string& sentence : doubled_trials(runs)) said.push_back(std::move(sentence));
   for (std::string& sentence : other_units(machine, from)) said.push_back(std::move(sentence));
   for (std::string& sentence : odd_trials(machine, runs)) said.push_back(std::move(sentence));
+  for (std::string& sentence : other_launches(machine, runs)) said.push_back(std::move(sentence));
   return said;
 }
 

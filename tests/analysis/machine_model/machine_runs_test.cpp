@@ -51,6 +51,17 @@ class LookedOver : public ::testing::Test {
 
 TEST_F(LookedOver, NothingIsSaidOfRunsAsTheyShouldBe) { EXPECT_EQ(said(), ""); }
 
+// Trials of these runs begin at 1.5.
+TEST_F(LookedOver, LaunchesThatAreNotThoseStatedAreNoted) {
+  machine_.launches = {{"x", 1.5, 0.1}};
+  EXPECT_EQ(said(), "");
+  machine_.launches = {{"x", 1.2, 0.1}};
+  EXPECT_NE(said().find("launch: x begins at 1.4"), std::string::npos) << said();
+  EXPECT_NE(said().find("in the mean of 20 trials, and 1.2 +- 0.1 is stated: "), std::string::npos) << said();
+  machine_.launches = {{"x", 1.2, 0.1, true}};
+  EXPECT_EQ(said(), "");
+}
+
 TEST_F(LookedOver, OneTrialInDegreesIsSuspected) {
   scale(&MachineRow::seen, 180 / std::numbers::pi, 4, 5);
   EXPECT_NE(said().find("x: its values in trial 5 are "), std::string::npos) << said();
