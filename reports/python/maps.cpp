@@ -152,8 +152,19 @@ markov::BatchMap batch_of(const PythonMap& python, Call& call) {
   return markov::with_angles(std::move(map), python.angles, python.start);
 }
 
+// Returns a level of the user's as splitting takes it; none: it is learnt.
+markov::LevelFunction level_of(const py::object& level, const PythonMap& python, Call& call) {
+  if (level.is_none()) return {};
+  return [&level, &python, &call](int phase, std::span<const double> states, std::span<double> levels) {
+    call.ask([&] {
+      const py::object state = rows_of(states, levels.size());
+      take_levels(call_step([&] { return python.phases > 1 ? level(state, phase) : level(state); }), levels);
+    });
+  };
+}
+
 py::dict study_map(const py::dict& fields, const py::dict& options, const std::string& command,
-                   const py::object& progress) {
+                   const py::object& progress, const py::object& level) {
   const PythonMap python = map_of(fields);
   const Arguments given(options);
   Asked asked = asked_of(given);
@@ -167,6 +178,9 @@ py::dict study_map(const py::dict& fields, const py::dict& options, const std::s
   bool on_mesh = false;
   Call call(progress);
   const markov::BatchMap map = batch_of(python, call);
+  if (!level.is_none() && asked.method == WalkerMethod::mesh)
+    throw std::invalid_argument("level: has no meaning with method \"mesh\"");
+  asked.splitting.level = level_of(level, python, call);
   call.run([&] {
     const BeginPart begin = within(time_limit, parts_of(call));
     splitting = ask_both_ways(

@@ -81,4 +81,17 @@ void take_step(const py::object& returned, std::size_t rows, std::span<double> n
   take_failed(both[1], failed);
 }
 
+void take_levels(const py::object& returned, std::span<double> levels) {
+  const auto array = py::array_t<double, py::array::c_style | py::array::forcecast>::ensure(returned);
+  if (!array) {
+    PyErr_Clear();
+    throw py::type_error(fmt::format("level: numbers are to be returned, not {}",
+                                     std::string(py::str(py::type::of(returned).attr("__name__")))));
+  }
+  if (array.ndim() != 1 || array.size() != static_cast<py::ssize_t>(levels.size()))
+    throw py::value_error(fmt::format("level: {} numbers, one for each state, expected, and shape {} returned",
+                                      levels.size(), std::string(py::str(array.attr("shape")))));
+  std::copy_n(array.data(), levels.size(), levels.begin());
+}
+
 }  // namespace metastable::reports::python

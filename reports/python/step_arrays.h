@@ -23,4 +23,8 @@ py::object call_step(const std::function<py::object()>& step);
 /// @throws py::type_error or py::value_error saying what it returned instead
 void take_step(const py::object& returned, std::size_t rows, std::span<double> next, std::span<std::uint8_t> failed);
 
+/// Copies what a level function returned: a number for each state.
+/// @throws py::type_error or py::value_error saying what it returned instead
+void take_levels(const py::object& returned, std::span<double> levels);
+
 }  // namespace metastable::reports::python

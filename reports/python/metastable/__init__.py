@@ -210,7 +210,7 @@ def _repr(setting):
 def study(setting, *, method=None, cells=None, samples=None, tolerance=None, sequence=None, draws=None, tail=None,
           replicates=None, mixing_distance=None, eigenvalues=None, direct=False, certify=False, sensitivities=False,
           standard_errors=None, spacing=None, simulated_steps=None, guided_samples=None, memory_gb=None,
-          how_it_fails=False, seed=1, threads=0, time_limit=None, progress=None):
+          level=None, how_it_fails=False, seed=1, threads=0, time_limit=None, progress=None):
     """How many steps before it fails, with its 95 % interval, and what goes with that: `metastable steps`.
 
     setting          a Setting (returns a Study), a WalkerSetting, a Walker or a Machine, which stands for its walker()
@@ -240,6 +240,8 @@ def study(setting, *, method=None, cells=None, samples=None, tolerance=None, seq
     guided_samples   of the importance sampling beside it, asked above 100 steps; None: 4000, 0: none. It takes some
                      hundred rows of a Walker's step for each
     memory_gb        most memory of the meshes; None: 3
+    level            of a Walker or a Machine, what splitting splits by: level(state) -> n numbers that rise towards
+                     failure, of an (n, dimension) array of states (with phases > 1 level(state, phase)); None: learnt
 
     Of all:
     how_it_fails     the last steps before failure as well, from the chain or from the walks that splitting sees fail
@@ -254,7 +256,11 @@ def study(setting, *, method=None, cells=None, samples=None, tolerance=None, seq
                    direct=direct, certify=certify, sensitivities=sensitivities, standard_errors=standard_errors,
                    spacing=spacing, simulated_steps=simulated_steps, guided_samples=guided_samples,
                    memory_gb=memory_gb, how_it_fails=how_it_fails, seed=seed, threads=threads, time_limit=time_limit)
-    command = _called("study", setting,
+    if level is not None and not callable(level):
+        raise TypeError(f"level: a function expected, not {type(level).__name__}")
+    if level is not None and not isinstance(setting, (Walker, Machine)):
+        raise InputError("level: has no meaning under this setting")
+    command = _called("study", setting, level=level and getattr(level, "__name__", "level"),
                       **{key: value for key, value in options.items() if key not in ("threads", "time_limit")})
     if isinstance(setting, Machine):
         setting = setting.walker()
@@ -264,7 +270,7 @@ def study(setting, *, method=None, cells=None, samples=None, tolerance=None, seq
         if isinstance(setting, WalkerSetting):
             return WalkerStudy(_metastable.study_walkers([_fields(setting)], options, command, tell))
         if isinstance(setting, Walker):
-            return WalkerStudy(_metastable.study_map(_fields(setting), options, command, tell))
+            return WalkerStudy(_metastable.study_map(_fields(setting), options, command, tell, level))
     raise TypeError(f"setting: a Setting, WalkerSetting, Walker or Machine expected, not {type(setting).__name__}")
 
 

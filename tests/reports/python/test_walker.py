@@ -155,6 +155,28 @@ class Steps(unittest.TestCase):
         with self.assertRaisesRegex(metastable.InputError, "spacing: has no meaning under method splitting"):
             walker.study(method="splitting", spacing=1)
 
+    def test_a_level_of_ones_own_is_split_by(self):
+        def line(state, noise):
+            following = 0.5 * state + noise
+            return following, following[:, 0] > 3.5
+
+        walker = metastable.walker(line, 1, 1, start=[0])
+        learnt = walker.study(method="splitting", tolerance=0.2).expected_steps
+        own = walker.study(method="splitting", tolerance=0.2, level=lambda state: state[:, 0]).expected_steps
+        low, high = own.interval_95
+        self.assertLess(abs(np.log(own.value / learnt.value)), 2 * np.log(high / low))
+        for level, kind, sentence in (
+                (lambda state: state, ValueError, r"level: \d+ numbers, one for each state, expected, and shape"),
+                (lambda state: "far", TypeError, "level: numbers are to be returned, not str"),
+                (lambda state: np.where(state[:, 0] > 0, np.nan, 0), metastable.MapError, "level function: it is nan"),
+                (3, TypeError, "level: a function expected, not int")):
+            with self.subTest(sentence), self.assertRaisesRegex(kind, sentence):
+                walker.study(method="splitting", tolerance=0.2, level=level)
+        with self.assertRaisesRegex(metastable.InputError, 'level: has no meaning with method "mesh"'):
+            walker.study(level=lambda state: state[:, 0])
+        with self.assertRaisesRegex(metastable.InputError, "level: has no meaning under this setting"):
+            metastable.study(metastable.WalkerSetting("simplest", slope_sd_deg=0.05), level=abs)
+
     def test_a_mesh_stands_alone_where_splitting_has_no_number(self):
         def two_gaits(state, noise):
             following = np.tanh(3 * state) + 0.3 * noise
