@@ -321,7 +321,8 @@ class Diagnosis(Result):
         return self._html + "".join(_frames.drawn(script) for script in self._scripts)
 
     def _headline(self):
-        return f"{self.verdict}: {self.sentences[0]}"
+        named = self.verdict in ("explained", "partly_explained")
+        return f"{self.verdict}: {' '.join(self.sentences[:2 if named else 1])}"
 
     def _rows(self):
         return [_frames.flat(cause) for cause in self.causes]
