@@ -1,6 +1,7 @@
 #include "analysis/diagnosis/diagnosis.h"
 
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 
 #include <algorithm>
 #include <cmath>
@@ -126,8 +127,9 @@ std::vector<const Candidate*> wanted(const TransitionModel& model, const std::ve
       why += fmt::format(
           "; {}: {}", one->id,
           one->undecidable.empty() ? "it has no parameters: name another effect beside it" : one->undecidable);
-    throw std::invalid_argument(
-        fmt::format("catalogue: these data under this law can show none of {}{}", fmt::join(ids, ", "), why));
+    throw std::invalid_argument(fmt::format("catalogue: these data under this law can show none of {}{}",
+                                            ids.empty() ? "its effects" : fmt::format("{}", fmt::join(ids, ", ")),
+                                            why));
   }
   return candidates;
 }

@@ -1,6 +1,7 @@
 #include "analysis/diagnosis/diagnosis_sentences.h"
 
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 
 #include <algorithm>
 #include <cmath>
@@ -246,7 +247,6 @@ void say_what_closes(std::vector<std::string>& s, const Diagnosis& d) {
 // Says the expected steps of the machine itself, as measured and where they were asked.
 void say_machine_steps(std::vector<std::string>& s, const Diagnosis& d) {
   for (const MachineSteps& machine : d.shrinkage.steps.machine) {
-    if (!(machine.steps.lower > 0)) continue;
     // Trials of a machine end after some steps, and their first ones may fail more seldom than later ones.
     const std::string where = !machine.where.empty()       ? " " + machine.where
                               : d.data.step_name == "step" ? " in trials like these"
@@ -313,14 +313,17 @@ std::string closed_unknown(const Shrinkage& s) {
 std::string what_it_buys(const Diagnosis& d) {
   const NextExperiment& best = d.limits.next.front();
   const auto same = std::ranges::find_if(d.limits.next, [](const NextExperiment& one) { return one.changes.empty(); });
-  std::string text = fmt::format(", with a likelihood ratio between them of {:.2g}", std::exp(0.5 * best.separation));
+  std::string text = fmt::format(", with a likelihood ratio of {:.2g} between the likeliest and the others",
+                                 std::exp(0.5 * best.separation));
   if (same != d.limits.next.end() && &*same != &best)
-    text += fmt::format(" expected ({:.2g} from the same experiment again)", std::exp(0.5 * same->separation));
+    text +=
+        fmt::format(" expected on average ({:.2g} from the same experiment again)", std::exp(0.5 * same->separation));
   else
-    text += " expected";
+    text += " expected on average";
   if (best.separation < d.rules.told_apart)
-    text += fmt::format("; no change looked at reaches the {:.0f} that tell causes apart, so take several such",
-                        std::exp(0.5 * d.rules.told_apart));
+    text +=
+        fmt::format("; no change looked at reaches the {:.0f} that tell causes apart, so take several such experiments",
+                    std::exp(0.5 * d.rules.told_apart));
   return text;
 }
 

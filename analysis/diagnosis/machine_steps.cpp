@@ -225,7 +225,8 @@ void add_machine_steps(Diagnosis& d, const TransitionModel& model, const Weighed
   const auto add = [&](const std::string& where, const std::vector<double>& there) {
     MachineSteps machine{where, joined_steps(of_effects, there, error, at_risk, rests), false};
     if (at_risk > 0 && rests == 0) {
-      s.machine.push_back(survivors_steps(where, machine.steps.lower, s, d.verdict != Verdict::unexplained));
+      machine = survivors_steps(where, machine.steps.lower, s, d.verdict != Verdict::unexplained);
+      if (machine.steps.lower > 1) s.machine.push_back(std::move(machine));
       return;
     }
     if (where.empty()) machine.steps = bounded_by_count(machine.steps, s);

@@ -58,8 +58,9 @@ Estimate joined_steps(const std::vector<double>& here, const std::vector<double>
 /// @param counted  as set_observed() leaves it
 Estimate bounded_by_count(const Estimate& joined, const StepsBeforeFailure& counted);
 
-/// Returns what is known where no trial failed: a lower end alone, with 95 %. It is the larger one of the count's,
-/// which holds for the experiment measured, and of what the models leave open, where they explain the data; 1 at least.
+/// Returns what is known where no trial failed: a lower end alone. It is the larger one of two with 95 % each: of the
+/// count's, which holds for the experiment measured, and of what the models leave open, where they explain the data; 1,
+/// which says nothing, at least.
 /// @param model_lower  the lower end of joined_steps()  @param counted  as set_observed() leaves it
 MachineSteps survivors_steps(const std::string& where, double model_lower, const StepsBeforeFailure& counted,
                              bool explained);

@@ -17,6 +17,7 @@ namespace {
 constexpr double gained_beside = 9;  // by the pair, beyond the effect's own gain
 constexpr double lost_alone = 30;    // most that it is short of its own fit there, without the other [log likelihood]
 constexpr std::size_t most_other_ways = 3;
+constexpr double alike_from = 12;  // evidence of an effect alone, for others as likely to be tried in its place
 
 // A pair that is worth a fit: a leading effect, and what was scanned beside its fit.
 struct Try {
@@ -181,22 +182,24 @@ void refine_paired(const RankingProblem& problem, EffectPairs& ranked, ScansBesi
 
 // Lists the pairs of what acts like an effect of a pair by itself, with the other one: of large effects, what scores
 // promise beside the other one differs by more than what they turn out to gain.
-void add_alike_alone(const RankingProblem& problem, const EffectPairs& ranked, ScansBeside& beside,
-                     const EffectTerm& term, const EffectTerm& partner, std::vector<Try>& tries) {
+void add_alike_alone(const RankingProblem& problem, const EffectPairs& ranked, const EffectTerm& term,
+                     const EffectTerm& partner, std::vector<Try>& tries) {
   const SingleEffects& singles = ranked.singles;
-  const double least = singles.causes[problem.index_of(term.candidate)].evidence - alike_margin;
+  const RankedCause& own = singles.causes[problem.index_of(term.candidate)];
+  if (!own.fitted() || !(own.evidence > alike_from) || partner.candidate->parameters.empty()) return;
   for (std::size_t i = 0; i < singles.causes.size(); ++i) {
     const RankedCause& other = singles.causes[i];
-    if (!other.fitted() || other.candidate_undecided() || !(other.evidence >= least)) continue;
+    if (!other.fitted() || other.candidate_undecided() || !(other.evidence >= own.evidence - alike_margin)) continue;
     const Candidate* candidate = other.terms.front().candidate;
     if (candidate->parameters.empty() || candidate == term.candidate || candidate == partner.candidate) continue;
-    const ScannedEffect* second = beside.of(singles, i).find(partner.candidate);
-    if (!second || is_tried(tries, i, partner.candidate) ||
+    if (is_tried(tries, i, partner.candidate) || is_tried(tries, problem.index_of(partner.candidate), candidate) ||
         std::ranges::any_of(ranked.pairs, [&](const RankedCause& pair) {
           return extends(pair.terms, {other.terms.front(), partner});
         }))
       continue;
-    tries.push_back({i, *second});
+    tries.push_back(
+        {i, scan_effects(problem.model, other.fit, {partner.candidate}, problem.threads, {&singles.scan, candidate})
+                .effects.front()});
   }
 }
 
@@ -216,8 +219,7 @@ void complete_pairs(const RankingProblem& problem, EffectPairs& ranked, ScansBes
           }))
         tries.push_back({leader, *effect});
   }
-  for (const std::size_t k : {0, 1})
-    add_alike_alone(problem, ranked, beside, best->terms[k], best->terms[1 - k], tries);
+  for (const std::size_t k : {0, 1}) add_alike_alone(problem, ranked, best->terms[k], best->terms[1 - k], tries);
   fit_pairs(problem, ranked.singles, tries, ranked.pairs);
 }
 

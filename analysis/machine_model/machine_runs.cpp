@@ -128,7 +128,7 @@ std::vector<std::string> doubled_trials(const MachineRuns& runs) {
 // Names some trials: how many, of how many, and one of them.
 std::string named_trials(const MachineRuns& runs, const std::vector<std::size_t>& some) {
   if (some.size() == 1) return "trial " + runs.name_of(some.front());
-  return fmt::format("{} of {} trials (as {})", some.size(), runs.trials.size(), runs.name_of(some.front()));
+  return fmt::format("{} of {} trials (trial {} for one)", some.size(), runs.trials.size(), runs.name_of(some.front()));
 }
 
 // What a column holds, by trial; missing values are left out.
@@ -163,8 +163,9 @@ std::vector<std::string> stuck_trials(const MachineRuns& runs, const TrialColumn
     if (stands_still(column.values[t])) stuck.push_back(t);
   }
   if (stuck.empty() || 2 * stuck.size() > told) return {};
-  return {fmt::format("{}: it is {} in every row of {}: did its sensor stand still?", column.name,
-                      column.values[stuck.front()].front(), named_trials(runs, stuck))};
+  return {fmt::format("{}: it is {} in every row of trial {}{}: did its sensor stand still?", column.name,
+                      column.values[stuck.front()].front(), runs.name_of(stuck.front()),
+                      stuck.size() > 1 ? fmt::format(", and constant in {} others", stuck.size() - 1) : "")};
 }
 
 // Two heaps of trials by the size of a column in them.
@@ -221,13 +222,13 @@ std::vector<std::string> other_launches(const Machine& machine, const MachineRun
   std::vector<std::string> said;
   for (const MachineLaunch& launch : machine.launches) {
     const auto sensor = std::ranges::find(machine.observe, launch.state, &MachineSensor::state);
-    if (launch.assumed || sensor == machine.observe.end()) continue;
+    if (launch.assumed || sensor == machine.observe.end() || !sensor->sd) continue;
     const auto column = static_cast<std::size_t>(sensor - machine.observe.begin());
     double sum = 0, count = 0;
     for (const MachineTrial& trial : runs.trials)
       if (!trial.rows.empty() && std::isfinite(trial.rows.front().seen[column]))
         sum += trial.rows.front().seen[column], ++count;
-    const double error = std::hypot(launch.sd, sensor->sd.value_or(0)) / std::sqrt(count);
+    const double error = std::hypot(launch.sd, *sensor->sd) / std::sqrt(count);
     const double off = std::abs(sum / count - launch.mean) / error;
     if (count < static_cast<double>(fewest_compared) || !(error > 0) || !(off > launch_off)) continue;
     said.push_back(fmt::format(

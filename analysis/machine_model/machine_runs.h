@@ -59,8 +59,8 @@ struct ColumnSpread {
 ColumnSpread column_spread(const MachineRuns& runs, std::size_t sensor);
 
 /// Lists in sentences the signs that the runs are not this machine's: columns in other units, in all trials or in some;
-/// a column that is constant in some trials, an input that is in all; trials that are there twice; first rows whose mean
-/// is four standard errors and more off the launch that is stated.
+/// a column that is constant in some trials, an input that is in all; trials that are there twice; first rows whose
+/// mean is four standard errors and more off the launch that is stated.
 /// @throws std::invalid_argument where they do not fit the machine: no transition, fewer rows than parameters, rows of
 ///   another shape, time that runs back within a trial, a state that is constant, a first row that lacks a state
 ///   without launch; where the map makes something else of the same rows when it is asked again

@@ -39,7 +39,7 @@ std::string file_in(const ExperimentSource& source, const char* name) {
 // is wrong may only seem so.
 void require_model(const Defects& defects) {
   for (const std::string& line : defects.lines())
-    if (line.find("machine.model") != std::string::npos)
+    if (line.find("machine.model") != std::string::npos || line.find("'machine'") != std::string::npos)
       throw InputError({line +
                         "; write model = \"compass\" or model = \"simplest\" below [machine], and bring walks of a "
                         "simulator of your own from Python, as metastable.machine() and metastable.runs()"});

@@ -10,14 +10,14 @@
 namespace metastable::markov {
 namespace {
 
-constexpr double narrowest_gap_share =
-    1.0 / 512;                            // of the spacing: gaps are halved so far, to find where failures begin
-constexpr double widest_gap_share = 0.5;  // of the spacing: so far all gaps are halved in which they do
-constexpr std::size_t most_places = 6;    // that a polynomial goes through
-constexpr double foretold = 2e-3;         // stationary sds: what a gap's middle may lie off before it was stepped;
-                                          // afterwards a sixty-fourth is left
-constexpr double extrapolated = 10;       // times that, where a polynomial had to look beyond its places
-constexpr int foreseen = 2;               // further halvings of a gap that a dear map is asked for ahead
+// Gaps in which failures begin, or the curve bends, are halved down to this share of the spacing; down to the second
+// one where what happens there is rare.
+constexpr double narrowest_gap_share = 1.0 / 512, widest_gap_share = 0.5;
+constexpr std::size_t most_places = 6;  // that a polynomial goes through
+constexpr double foretold = 2e-3;       // stationary sds: what a gap's middle may lie off before it was stepped;
+                                        // afterwards a sixty-fourth is left
+constexpr double extrapolated = 10;     // times that, where a polynomial had to look beyond its places
+constexpr int foreseen = 2;             // further halvings of a gap that a dear map is asked for ahead
 constexpr double per_cell = 2,
                  pair_limit = 1024;  // pairs of Gauss's points a cell of the lattice, and between two places
 

@@ -31,8 +31,8 @@ class ScoreCurve {
   /// @param spacing  > 0: between places where the curve is smooth
   /// @param reach    > 0: scores beyond, of either sign, are not looked at; they fail where the last place does, or
   ///                 else leave
-  /// @param beyond   the state's action less that of the cheapest failure: where failures begin is found the less
-  ///                 closely, the rarer it makes them
+  /// @param beyond   the state's action less that of the cheapest failure: the rarer that makes what happens, the less
+  ///                 closely it is looked at where failures begin, and where the curve bends or jumps
   ScoreCurve(double spacing, double reach, double beyond = -std::numeric_limits<double>::infinity());
 
   /// Returns the scores to be stepped next, ascending; none when the curve is known.

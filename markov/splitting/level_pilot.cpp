@@ -46,7 +46,7 @@ class Pilot {
     std::size_t bins = 0;
     const auto push = [&] {
       if (calls() - calls_before > options_.most_calls)
-        throw std::runtime_error(fmt::format(
+        throw NoSplitting(fmt::format(
             "splitting: {} in {} steps of the map, pushed as far from the middle as they go: no number is "
             "given",
             failed == 0 ? "nothing fails" : fmt::format("only {} replicas fail", failed), calls() - calls_before));
@@ -126,7 +126,7 @@ class Pilot {
       pilot_.mixing_steps = mixing();
       if (4 * pilot_.mixing_steps <= static_cast<double>(ensemble_.steps())) return true;
       if (calls() > options_.most_calls)
-        throw std::runtime_error(fmt::format(
+        throw NoSplitting(fmt::format(
             "splitting: the start is not forgotten within {} steps (memory lasts some {:.3g}, by what is seen of "
             "it): no number is given",
             ensemble_.steps(), pilot_.mixing_steps));

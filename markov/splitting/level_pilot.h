@@ -37,7 +37,7 @@ struct LevelPilot {
 /// Lets an ensemble spread, first by its distance from where it mostly is, until replicas fail; then learns from what
 /// it visited the chance of failing within 1.5 mixing times (learn_level), spreads it by that, and learns again, three
 /// times in all. Where replicas fail in 0.003 of all steps and more it learns nothing.
-/// @throws std::runtime_error where no replica fails within most_calls; MapError as WeightedEnsemble
+/// @throws NoSplitting where no replica fails within most_calls; MapError as WeightedEnsemble
 LevelPilot level_pilot(const BatchMap& map, std::span<const double> start, const PilotOptions& options);
 
 }  // namespace metastable::markov

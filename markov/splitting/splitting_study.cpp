@@ -26,10 +26,10 @@ constexpr double shortest_burn_in = 30;  // steps, as memory that is not linear 
 constexpr double refused_level = 1e-3;
 constexpr std::size_t walks_of_a_round = 1000;  // that failed, whose last steps are kept
 constexpr double widest = 4;                    // upper over lower end of an interval that is given
-constexpr double much_rarer = 7;                // ln 1000: slips into another gait a failure that bear on no number
-constexpr double met_when_heated = 6;           // action under larger noise of what some thousand steps meet for sure
-constexpr double settled_growth = 0.1;      // of the share in other gaits, from the burn-in to the end of the rounds
-constexpr std::uint64_t most_attempts = 3;  // to learn levels that agree
+constexpr double much_rarer = 7;        // ln 1000: slips so many times more seldom than failure bear on no number
+constexpr double met_when_heated = 6;   // action, under larger noise, of a slip that some thousand steps meet for sure
+constexpr double settled_growth = 0.1;  // of the share in other gaits, from the burn-in to the end of the rounds
+constexpr std::uint64_t most_attempts = 3;                // to learn levels that agree
 constexpr std::uint64_t streams_of_an_attempt = 1 << 14;  // streams of random numbers that one attempt may use
 
 /// One independent ensemble and what was seen of it.
@@ -114,7 +114,7 @@ class Study {
       const double first_walk =
           static_cast<double>(burn_in_ + first) * static_cast<double>(options_.replicas) * options_.rounds;
       if (first_walk > static_cast<double>(options_.most_calls))
-        throw std::runtime_error(fmt::format(
+        throw NoSplitting(fmt::format(
             "splitting: the start is forgotten in some {:.3g} steps, so that the rounds would take {:.3g} steps of "
             "the map: no number is given",
             mixing_, first_walk));
@@ -201,7 +201,7 @@ class Study {
       double share = 0;  // that failed in the last step
       while (round.ensemble->survival() > hardly_any * share) {
         if (round.ensemble->calls() > most)
-          throw std::runtime_error(fmt::format(
+          throw NoSplitting(fmt::format(
               "splitting: all {} replicas of a pilot fail in one step, and those of another ensemble walk on "
               "after {} steps: no number is given",
               options_.replicas, round.ensemble->steps()));
@@ -365,12 +365,13 @@ class Study {
     // One round of each level looks; the others are followed where it has found something. What is too rare for them is
     // met under larger noise, which meets in some thousand steps what comes a thousand times more seldom than failure.
     std::vector<double> before, after;
-    for (std::size_t r = 0; r < pilots_.size(); ++r) after.push_back(slipped_by_now(rounds_[r]));
+    for (std::size_t r = 0; r < pilots_.size(); ++r) after.push_back(slipped_by_now(rounds_[r])), tell(1);
     const double heat = std::sqrt(std::max(1.0, (std::log(found_.steps.value) + much_rarer) / met_when_heated));
     gait.left(gait.heated(start_, heat, options_.seed));
     if (!gait.elsewhere().empty()) {
-      for (std::size_t r = pilots_.size(); r < rounds_.size(); ++r) after.push_back(slipped_by_now(rounds_[r]));
-      for (const Round& round : rounds_) before.push_back(slipped(round.states, round.weights));
+      for (std::size_t r = pilots_.size(); r < rounds_.size(); ++r)
+        after.push_back(slipped_by_now(rounds_[r])), tell(1);
+      for (const Round& round : rounds_) before.push_back(slipped(round.states, round.weights)), tell(1);
       judge_slips(before, after, describe_state(map_, gait.elsewhere()), heat);
     }
     calls_ += gait.calls();
@@ -381,7 +382,7 @@ class Study {
   void judge_slips(const std::vector<double>& before, const std::vector<double>& after, const std::string& where,
                    double heat) {
     const double first = mean_of(before), last = mean_of(after);
-    if (!(last > 0)) {
+    if (!(last > 0 || first > 0)) {
       found_.disagreement = fmt::format(
           "splitting: none of the walks has slipped into another gait, at {}, within {} steps, and under {:.2g} times "
           "the noise some do: how failures come from there is not known",
@@ -389,11 +390,14 @@ class Study {
       return;
     }
     const Measured grown = ratio_of_means(after, before);
-    if (std::abs(grown.value - 1) + 2 * grown.standard_error < settled_growth) return;
+    const double changed = std::abs(grown.value - 1), error = 2 * grown.standard_error;
+    if (changed + error < settled_growth) return;
     found_.disagreement = fmt::format(
-        "splitting: of the walks {:.2g} % are in another gait, at {}, after {} steps, and {:.2g} % after {}: "
-        "these slip too seldom for rounds of such a length to tell how failures come from there",
-        100 * first, where, burn_in_, 100 * last, found_.round_steps);
+        "splitting: of the walks {:.2g} % are in another gait, at {}, after {} steps, and {:.2g} % after {}: {}",
+        100 * first, where, burn_in_, 100 * last, found_.round_steps,
+        changed > error || !std::isfinite(error)
+            ? "these slip too seldom for rounds of such a length to tell how failures come from there"
+            : "whether that share has settled is not known to a tenth");
   }
 
   static double mean_of(const std::vector<double>& all) {

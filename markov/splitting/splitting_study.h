@@ -68,7 +68,7 @@ MeshEstimate steps_from_quasi_stationary(const SplittingStudy& study);
 /// different levels differ, and where walks have slipped into another gait (StartGait) and the share of those has not
 /// settled: it may change by less than a tenth, two standard errors included, from the end of the burn-in to that of
 /// the rounds. Maps that draw for themselves cannot be followed without noise: of these no other gait is seen.
-/// @throws std::invalid_argument for options out of range; std::runtime_error where no replica fails, saying after how
+/// @throws std::invalid_argument for options out of range; NoSplitting where no replica fails, saying after how
 /// many steps of the map; MapError as WeightedEnsemble
 SplittingStudy splitting_study(const BatchMap& map, std::span<const double> start,
                                const SplittingOptions& options = {});

@@ -16,7 +16,7 @@ constexpr std::size_t most_turns = 256;  // of an orbit
 constexpr std::size_t hot_walks = 128;
 constexpr int hot_steps = 128, kept_every = 8;
 constexpr double hottest = 8;  // sds: no score is larger
-constexpr std::uint64_t hot_stream = 0xb000;
+constexpr std::uint64_t hot_stream = 0x10000;
 constexpr double near_share = 0.5, same_turn = 1e-6,
                  aside = 1e-6;  // of the scale; an orbit that is the start may be unstable
 
@@ -75,9 +75,10 @@ void StartGait::revolve(std::vector<double>& states, std::vector<std::size_t>& w
 }
 
 std::vector<double> StartGait::heated(std::span<const double> start, double heat, std::uint64_t seed) {
+  const int revolutions = std::max(kept_every, hot_steps / map_.phases);
   std::vector<double> states, met;
   std::vector<std::size_t> which;
-  for (int r = 0; r < hot_steps / map_.phases + 1; ++r) {
+  for (int r = 0; r < revolutions; ++r) {
     std::vector<std::uint8_t> walks(hot_walks, 0);
     for (const std::size_t walk : which) walks[walk] = 1;
     for (std::size_t walk = 0; walk < hot_walks; ++walk) {
@@ -101,7 +102,7 @@ std::vector<std::uint8_t> StartGait::left(std::span<const double> states) {
   std::vector<double> at(states.begin(), states.end());
   std::vector<std::size_t> which(n);
   std::iota(which.begin(), which.end(), std::size_t{0});
-  for (int r = 0; r < to_the_gait && !which.empty(); ++r) {
+  for (int r = 0; r <= to_the_gait && !which.empty(); ++r) {
     std::size_t away = 0;
     for (std::size_t i = 0; i < which.size(); ++i) {
       if (near(&at[i * d])) continue;
@@ -109,7 +110,7 @@ std::vector<std::uint8_t> StartGait::left(std::span<const double> states) {
       std::copy_n(&at[i * d], d, &at[away++ * d]);
     }
     which.resize(away), at.resize(away * d);
-    if (!which.empty()) revolve(at, which);
+    if (!which.empty() && r < to_the_gait) revolve(at, which);
   }
   if (elsewhere_.empty() && !which.empty()) elsewhere_.assign(at.begin(), at.begin() + static_cast<std::ptrdiff_t>(d));
   std::vector<std::uint8_t> found(n, 0);

@@ -24,11 +24,12 @@ class StartGait {
   bool none() const { return orbit_.empty(); }
 
   /// Follows states of phase 0 without noise, 300 revolutions at most. Returns for each whether it ends neither in
-  /// failure nor near the orbit. @pre !none()
+  /// failure nor near the orbit. A number of the state that comes back more slowly, or never, counts as another gait's.
+  /// @pre !none()
   std::vector<std::uint8_t> left(std::span<const double> states);
 
-  /// Returns states of phase 0 that 128 walks from `start` come through in 128 steps under `heat` times the noise; a
-  /// walk that fails begins again.
+  /// Returns states of phase 0 that 128 walks from `start` come through in 128 steps, or eight revolutions, under
+  /// `heat` times the noise; a walk that fails begins again.
   std::vector<double> heated(std::span<const double> start, double heat, std::uint64_t seed);
 
   /// Returns the state to which the first of those led that left() has found; empty: it has found none.

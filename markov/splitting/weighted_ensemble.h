@@ -6,12 +6,19 @@
 #include <functional>
 #include <optional>
 #include <span>
+#include <stdexcept>
 #include <vector>
 
 #include "markov/mesh/batch_map.h"
 #include "markov/splitting/failing_walks.h"
 
 namespace metastable::markov {
+
+/// Says that splitting has no number to give, and why.
+class NoSplitting : public std::runtime_error {
+ public:
+  using std::runtime_error::runtime_error;
+};
 
 /// Writes the level of each state at a phase: a number that rises towards failure. Must be safe to call from several
 /// threads, finite, and the same for the same state.

@@ -69,8 +69,11 @@ std::optional<SplittingAnswer> ask_both_ways(WalkerMethod method, const std::str
   } catch (const markov::Disagreement& error) {
     if (!found) throw;
     answer.no_splitting = error.what();
-    return answer;
+  } catch (const markov::NoSplitting& error) {
+    if (!found) throw;
+    answer.no_splitting = error.what();
   }
+  if (!answer.no_splitting.empty()) return answer;
   if (found) markov::require_agreement(*found, answer.passage, name);
   return answer;
 }

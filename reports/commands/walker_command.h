@@ -51,7 +51,8 @@ struct WalkerAnswer {
 /// Finds a mesh's answer, that of splitting, or both, held against each other.
 /// @param mesh  finds the mesh's answer; under `both`, what it throws for want of a mesh, or because other ways refute
 ///        it, becomes SplittingAnswer::no_mesh
-/// @param split  finds the answer of splitting with a listener
+/// @param split  finds the answer of splitting with a listener; under `both`, where there is a mesh, what it throws for
+///        want of a number becomes SplittingAnswer::no_splitting
 /// @returns the answer of splitting where it was asked
 /// @throws as these; markov::Disagreement where the two contradict each other
 std::optional<SplittingAnswer> ask_both_ways(WalkerMethod method, const std::string& name,

@@ -158,7 +158,7 @@ markov::LevelFunction level_of(const py::object& level, const PythonMap& python,
   return [&level, &python, &call](int phase, std::span<const double> states, std::span<double> levels) {
     call.ask([&] {
       const py::object state = rows_of(states, levels.size());
-      take_levels(call_step([&] { return python.phases > 1 ? level(state, phase) : level(state); }), levels);
+      take_levels(call_step([&] { return python.phases > 1 ? level(state, phase) : level(state); }, "level"), levels);
     });
   };
 }

@@ -2,6 +2,7 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <cstring>
 #include <string>
 
@@ -51,21 +52,21 @@ py::array_t<double> rows_of(std::span<const double> values, std::size_t rows) {
   return array;
 }
 
-py::object call_step(const std::function<py::object()>& step) {
+py::object call_step(const std::function<py::object()>& step, const std::string& called) {
   try {
     return step();
   } catch (py::error_already_set& error) {
     const std::string said = py::str(error.value());
     if (error.matches(PyExc_ValueError) && said.find("read-only") != std::string::npos)
       py::raise_from(error, PyExc_ValueError,
-                     ("step: it writes into a read-only array, as its arguments are (" + said + ")").c_str());
+                     (called + ": it writes into a read-only array, as its arguments are (" + said + ")").c_str());
     else if (error.matches(PyExc_ValueError) && said.starts_with("The truth value of an array"))
-      py::raise_from(
-          error, PyExc_ValueError,
-          ("step: it asks whether an array is true, but states, noise and parameters are arrays of one number "
-           "a row, so that numpy.where has to take the place of if (" +
-           said + ")")
-              .c_str());
+      py::raise_from(error, PyExc_ValueError,
+                     (called +
+                      ": it asks whether an array is true, but states, noise and parameters are arrays of one number "
+                      "a row, so that numpy.where has to take the place of if (" +
+                      said + ")")
+                         .c_str());
     else
       throw;
     throw py::error_already_set();

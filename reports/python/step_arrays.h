@@ -7,6 +7,7 @@
 #include <cstdint>
 #include <functional>
 #include <span>
+#include <string>
 
 namespace metastable::reports::python {
 
@@ -15,9 +16,10 @@ namespace py = pybind11;
 /// Returns numbers of one kind in rows; Python may keep them, and may not write into them.
 py::array_t<double> rows_of(std::span<const double> values, std::size_t rows);
 
-/// Returns what a step returns. @throws what it throws; ValueError saying so where it writes into its arguments, or
+/// Returns what a step, or another function of the user's, returns. @param called  its name in messages
+/// @throws what it throws; ValueError saying so where it writes into its arguments, or
 /// asks whether an array is true
-py::object call_step(const std::function<py::object()>& step);
+py::object call_step(const std::function<py::object()>& step, const std::string& called = "step");
 
 /// Copies what a step returned: (next states [rows x dimension], failed [rows]).
 /// @throws py::type_error or py::value_error saying what it returned instead

@@ -109,7 +109,7 @@ std::string with_splitting_json(const std::string& mesh_json, const SplittingAns
 }
 
 std::string with_splitting_text(const std::string& mesh_text, const SplittingAnswer& beside) {
-  if (!beside.no_splitting.empty()) return mesh_text + "\nBeside it, by splitting: " + beside.no_splitting + "\n";
+  if (!beside.no_splitting.empty()) return mesh_text + "\nBeside it, no number: " + beside.no_splitting + "\n";
   Lines lines = steps_lines(beside.passage);
   for (auto& line : effort_lines(beside.passage)) lines.push_back(std::move(line));
   return mesh_text + "\nBeside it, by splitting (agreed: within the joint interval)\n" + joined(lines);

@@ -241,7 +241,8 @@ def study(setting, *, method=None, cells=None, samples=None, tolerance=None, seq
                      hundred rows of a Walker's step for each
     memory_gb        most memory of the meshes; None: 3
     level            of a Walker or a Machine, what splitting splits by: level(state) -> n numbers that rise towards
-                     failure, of an (n, dimension) array of states (with phases > 1 level(state, phase)); None: learnt
+                     failure, of an (n, dimension) array of states (with phases > 1 level(state, phase)); angles are
+                     within pi of the start's; None: learnt
 
     Of all:
     how_it_fails     the last steps before failure as well, from the chain or from the walks that splitting sees fail

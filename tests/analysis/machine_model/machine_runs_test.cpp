@@ -71,7 +71,7 @@ TEST_F(LookedOver, OneTrialInDegreesIsSuspected) {
 
 TEST_F(LookedOver, HalfOfTheTrialsInDegreesAreSuspected) {
   scale(&MachineRow::seen, 180 / std::numbers::pi, 10, 20);
-  EXPECT_NE(said().find("x: its values in 10 of 20 trials (as 11) are "), std::string::npos) << said();
+  EXPECT_NE(said().find("x: its values in 10 of 20 trials (trial 11 for one) are "), std::string::npos) << said();
 }
 
 // The median of a trial of another machine is another one, too: its first values tell of the unit alone.
@@ -79,14 +79,16 @@ TEST_F(LookedOver, TrialsOfAnotherMachineInDegreesAreSuspectedByWhereTheyBegin) 
   for (std::size_t t = 10; t < 20; ++t)
     for (std::size_t k = 0; k < 12; ++k)
       runs_.trials[t].rows[k].seen[0] *= 180 / std::numbers::pi * std::pow(0.5, static_cast<double>(k));
-  EXPECT_NE(said().find("x: its first values in 10 of 20 trials (as 11) are "), std::string::npos) << said();
+  EXPECT_NE(said().find("x: its first values in 10 of 20 trials (trial 11 for one) are "), std::string::npos) << said();
 }
 
 TEST_F(LookedOver, AnInputInAnotherUnitIsSuspected) {
   scale(&MachineRow::inputs, 0.001, 0, 3);
-  EXPECT_NE(said().find("warmth: its values in 3 of 20 trials (as 1) are 0.001 times those of the others: are these in "
-                        "thousands of the others' unit?"),
-            std::string::npos)
+  EXPECT_NE(
+      said().find(
+          "warmth: its values in 3 of 20 trials (trial 1 for one) are 0.001 times those of the others: are these in "
+          "thousands of the others' unit?"),
+      std::string::npos)
       << said();
 }
 

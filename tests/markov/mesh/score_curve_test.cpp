@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <limits>
 #include <map>
 
 #include "markov/mesh/mesh_passage.h"
@@ -39,12 +40,14 @@ struct Shared {
   }
 };
 
-Shared share(double (*to)(double), double spacing, double reach = 8.5) {
+Shared share(double (*to)(double), double spacing, double reach = 8.5,
+             double beyond = -std::numeric_limits<double>::infinity()) {
   const NodeLattice lattice({{{0}, {1}, {1}, {1}}}, spacing, {0.3});
   Shared shared;
   const BatchMap map = landing(to, shared.steps);
   std::vector<std::pair<std::uint64_t, double>> parts;
-  shared.shares = follow_curves(map, lattice, 0, {{0}, {}, {reach}, {}}, 0.8, spacing).front().share(lattice, 0, 1, parts);
+  shared.shares =
+      follow_curves(map, lattice, 0, {{0}, {}, {reach}, {beyond}}, 0.8, spacing).front().share(lattice, 0, 1, parts);
   for (const auto& [key, mass] : parts) shared.at[lattice.state(key)[0]] += mass;
   return shared;
 }
@@ -70,6 +73,15 @@ TEST(ScoreCurve, FindsWhereFailuresBeginAndEnd) {
   EXPECT_NEAR(shared.shares.fails, fails, 5e-4);
   EXPECT_NEAR(shared.mean(0), 1 - fails, 5e-4);
   EXPECT_NEAR(share([](double z) { return z < -5.3 ? NAN : z; }, 0.25).shares.fails / below(-5.3), 1, 1e-2);
+}
+
+// What happens with a chance of exp(-10) beside the cheapest failure is looked at less closely, and nothing else is.
+TEST(ScoreCurve, LooksLessCloselyAtWhatIsRare) {
+  const auto fails = [](double z) { return z < -2.123 ? NAN : z; };
+  const Shared closely = share(fails, 0.25), near = share(fails, 0.25, 8.5, -20), rare = share(fails, 0.25, 8.5, 8);
+  EXPECT_EQ(near.steps, closely.steps);
+  EXPECT_LE(rare.steps, closely.steps - 5);
+  EXPECT_NEAR(rare.shares.fails / below(-2.123), 1, 0.3);
 }
 
 TEST(ScoreCurve, IsTornWhereTheMapJumpsAndNotBentAcross) {

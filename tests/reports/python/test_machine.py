@@ -248,7 +248,7 @@ class Refused(unittest.TestCase):
         runs = metastable.runs(machine, trial=data["trial"], swing_rad=np.where(late, np.degrees(data["swing_rad"]), data["swing_rad"]),
                                inputs={"warmth": np.where(data["trial"] == 2, 1000 * steady, steady)})
         notes = " ".join(metastable.diagnose(runs, machine, catalogue="dry_friction").notes)
-        self.assertRegex(notes, r"swing_rad: its values in 4 of 10 trials \(as 6\) are [56]\d\.?\d* times those of the others: "
+        self.assertRegex(notes, r"swing_rad: its values in 4 of 10 trials \(trial 6 for one\) are [56]\d\.?\d* times those of the others: "
                                 "are these in degrees where the others are in radians\\?")
         self.assertIn("warmth: its values in trial 2 are 1000 times those of the others: is it in thousandths of the others' unit?", notes)
 

@@ -188,7 +188,7 @@ class Steps(unittest.TestCase):
         study = walker.study(method="auto", tolerance=0.3)
         self.assertLess(abs(np.log(study.expected_steps.value / 1767.8)), 0.01)
         self.assertIn("are in another gait, at", study.splitting["no_number"])
-        self.assertIn("Beside it, by splitting: ", str(study))
+        self.assertIn("Beside it, no number: ", str(study))
 
     def test_a_biped_is_walked_without_a_mesh(self):
         biped = metastable.WalkerSetting("biped", slope_sd_deg=3)
