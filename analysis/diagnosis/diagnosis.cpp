@@ -118,11 +118,13 @@ std::vector<const Candidate*> wanted(const TransitionModel& model, const std::ve
   std::vector<const Candidate*> candidates;
   for (const Candidate& candidate : model.candidates())
     if (!restricted || std::find(ids.begin(), ids.end(), candidate.id) != ids.end()) candidates.push_back(&candidate);
-  // Another law has no parameters, and is compared all the same.
-  // What is compared whole, as another law is, has nothing that chance can be drawn of.
+  // An effect without parameters, as another contact law, is compared as a whole: it has no score of which chance could
+  // be drawn.
   const auto scanned = [](const Candidate* one) { return one->undecidable.empty() && !one->parameters.empty(); };
   if (std::ranges::none_of(candidates, scanned)) {
     std::string why;
+    if (std::ranges::find(ids, model.recalibration_id()) != ids.end())
+      why += fmt::format("; {}: the recalibration fits it in any case", model.recalibration_id());
     for (const Candidate* one : candidates)
       why += fmt::format(
           "; {}: {}", one->id,

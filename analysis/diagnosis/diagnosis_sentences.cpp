@@ -76,7 +76,8 @@ void say_unnamed(std::vector<std::string>& s, const Diagnosis& d) {
                   facet->facet, facet->aspect, facet->stance ? "stances" : d.data.step_name + "s"));
 }
 
-// A share of what is held out may come out below nothing or above all; none is known to be nothing.
+// Held-out shares may lie below 0 or above 1 by chance. A share that rounds to 0 % is written as less than 1 %, because
+// no share is known to be exactly nothing.
 std::string percent(double share) {
   const double rounded = std::round(100 * std::clamp(share, 0.0, 1.0));
   return rounded < 1 ? "less than 1 %" : fmt::format("{:.0f} %", rounded);

@@ -25,6 +25,7 @@ std::map<std::string, std::string> asked_in_vain(const TransitionModel& model,
                                                  const std::vector<std::string>& catalogue) {
   std::map<std::string, std::string> reasons;
   const auto look_at = [&](const std::string& id) {
+    if (id == model.recalibration_id()) return;  // it is fitted in any case
     const auto candidate = std::ranges::find(model.candidates(), id, &Candidate::id);
     if (candidate == model.candidates().end())
       reasons[id] = "the model does not have it with this law and these columns";

@@ -306,11 +306,15 @@ std::optional<WalkDescription> parse_walk_toml(const std::string& file, std::str
   WalkDescription walks;
   root.find("system", true);
   walks.title = root.text("title", false).value_or("");
-  if (std::optional<Keys> machine = root.table("machine", true)) {
-    walks.walker = machine->text("model", true).value_or("compass");
-    if (walks.walker != "compass" && walks.walker != "simplest")
+  const std::optional<Keys> stated = root.table("machine", true);
+  if (!stated) walks.no_walker = defects.lines().back();
+  if (std::optional<Keys> machine = stated) {
+    const std::optional<std::string> model = machine->text("model", true);
+    walks.walker = model.value_or("compass");
+    if (model && walks.walker != "compass" && walks.walker != "simplest")
       machine->report(*machine->find("model", true),
                       fmt::format("machine.model: {} is none of \"compass\", \"simplest\"", shown_text(walks.walker)));
+    if (!model || (walks.walker != "compass" && walks.walker != "simplest")) walks.no_walker = defects.lines().back();
     if (std::optional<Keys> known = machine->table("parameters", true)) {
       constexpr Range degrees{.low = 0, .high = 45, .high_open = true};
       walks.slope_deg = known->spread("slope_deg", true, degrees).value_or(Spread{3, 0.1});

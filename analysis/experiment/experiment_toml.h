@@ -24,6 +24,7 @@ struct WalkDescription {
     double correlation = 0;    ///< of neighbouring rows' errors
   };
   std::string title, walker;
+  std::string no_walker;           ///< line of the defect that no known walker is stated; empty: one is
   Spread slope_deg, slope_sd_deg;  ///< nominal value, and sd with which it is known
   std::vector<Column> columns;     ///< those that were measured
 };

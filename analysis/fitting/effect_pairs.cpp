@@ -180,8 +180,8 @@ void refine_paired(const RankingProblem& problem, EffectPairs& ranked, ScansBesi
   fit_pairs(problem, ranked.singles, tries, ranked.pairs);
 }
 
-// Lists the pairs of what acts like an effect of a pair by itself, with the other one: of large effects, what scores
-// promise beside the other one differs by more than what they turn out to gain.
+// Lists pairs in which another effect, about as likely alone, takes the place of one effect of a pair. The scores
+// beside the partner do not show such effects: for large effects their promises differ by more than the gains do.
 void add_alike_alone(const RankingProblem& problem, const EffectPairs& ranked, const EffectTerm& term,
                      const EffectTerm& partner, std::vector<Try>& tries) {
   const SingleEffects& singles = ranked.singles;

@@ -131,7 +131,7 @@ std::string named_trials(const MachineRuns& runs, const std::vector<std::size_t>
   return fmt::format("{} of {} trials (trial {} for one)", some.size(), runs.trials.size(), runs.name_of(some.front()));
 }
 
-// What a column holds, by trial; missing values are left out.
+// Each vector holds the values that one trial has in the column; missing values are left out.
 struct TrialColumn {
   std::string name;
   std::vector<std::vector<double>> values;
@@ -216,8 +216,8 @@ std::vector<std::string> trials_in_other_units(const MachineRuns& runs, const Tr
   return {};
 }
 
-// Holds the first rows against the launch that is stated: trials start from what was measured of them, so that nothing
-// else would tell.
+// Compares the first rows with the launch that is stated. The likelihood starts each trial from its measured first row,
+// so that no later test compares the two.
 std::vector<std::string> other_launches(const Machine& machine, const MachineRuns& runs) {
   std::vector<std::string> said;
   for (const MachineLaunch& launch : machine.launches) {

@@ -35,14 +35,13 @@ std::string file_in(const ExperimentSource& source, const char* name) {
   return (std::filesystem::path(source.folder) / name).string();
 }
 
-// Says alone that no walker, or an unknown one, is stated: which states are measured depends on it, so that what else
-// is wrong may only seem so.
-void require_model(const Defects& defects) {
-  for (const std::string& line : defects.lines())
-    if (line.find("machine.model") != std::string::npos || line.find("'machine'") != std::string::npos)
-      throw InputError({line +
-                        "; write model = \"compass\" or model = \"simplest\" below [machine], and bring walks of a "
-                        "simulator of your own from Python, as metastable.machine() and metastable.runs()"});
+// Refuses a folder that states no walker, or an unknown one, by that line alone. The walker says which states are
+// measured, so that its other defects may only seem to be some.
+void require_walker(const WalkDescription& told) {
+  if (!told.no_walker.empty())
+    throw InputError({told.no_walker +
+                      "; write model = \"compass\" or model = \"simplest\" below [machine], and bring walks of a "
+                      "simulator of your own from Python, as metastable.machine() and metastable.runs()"});
 }
 
 // Reads steps.csv, and trials.csv, of walks.
@@ -265,7 +264,7 @@ std::optional<Walks> parse_walks(const ExperimentSource& source) {
     throw InputError({file_in(source, "collisions.csv") +
                       ": collisions are a wheel's, but experiment.toml states walks, whose rows are in steps.csv: give "
                       "each machine a folder of its own"});
-  if (told) require_model(defects);
+  if (told) require_walker(*told);
   defects.check();
   if (!told) return std::nullopt;
   WalkerStatement statement;

@@ -26,10 +26,12 @@ constexpr double shortest_burn_in = 30;  // steps, as memory that is not linear 
 constexpr double refused_level = 1e-3;
 constexpr std::size_t walks_of_a_round = 1000;  // that failed, whose last steps are kept
 constexpr double widest = 4;                    // upper over lower end of an interval that is given
-constexpr double much_rarer = 7;        // ln 1000: slips so many times more seldom than failure bear on no number
-constexpr double met_when_heated = 6;   // action, under larger noise, of a slip that some thousand steps meet for sure
-constexpr double settled_growth = 0.1;  // of the share in other gaits, from the burn-in to the end of the rounds
-constexpr std::uint64_t most_attempts = 3;                // to learn levels that agree
+// These numbers say when walks that slip into another gait leave no number. A slip a thousand times rarer than failure
+// changes the expected steps by a thousandth for each time that walks last as long again in the other gait.
+constexpr double much_rarer = 7;            // ln 1000
+constexpr double met_when_heated = 6;       // under larger noise an event of this action comes once in some 400 steps
+constexpr double settled_growth = 0.1;      // of the share in other gaits, from the burn-in to the end of the rounds
+constexpr std::uint64_t most_attempts = 3;  // to learn levels that agree
 constexpr std::uint64_t streams_of_an_attempt = 1 << 14;  // streams of random numbers that one attempt may use
 
 /// One independent ensemble and what was seen of it.
@@ -362,8 +364,8 @@ class Study {
     const auto slipped_by_now = [&](const Round& round) {
       return slipped(round.ensemble->states(), round.ensemble->weights());
     };
-    // One round of each level looks; the others are followed where it has found something. What is too rare for them is
-    // met under larger noise, which meets in some thousand steps what comes a thousand times more seldom than failure.
+    // The states of one round for each level are followed first, and those of all rounds where some lead elsewhere.
+    // Slips that are too rare for the rounds are found by walks under larger noise.
     std::vector<double> before, after;
     for (std::size_t r = 0; r < pilots_.size(); ++r) after.push_back(slipped_by_now(rounds_[r])), tell(1);
     const double heat = std::sqrt(std::max(1.0, (std::log(found_.steps.value) + much_rarer) / met_when_heated));

@@ -66,6 +66,17 @@ std::set<std::string> best_of(const CauseRanking& ranking) {
   return ids;
 }
 
+// Returns the hypothesis of just these effects; nullptr, which is a failure, where it was not tried.
+const RankedCause* find_set(const std::vector<RankedCause>& all, const std::set<std::string>& wanted) {
+  for (const RankedCause& one : all) {
+    std::set<std::string> ids;
+    for (const EffectTerm& term : one.terms) ids.insert(term.candidate->id);
+    if (ids == wanted) return &one;
+  }
+  ADD_FAILURE() << "a set was not tried";
+  return nullptr;
+}
+
 TEST(EffectSets, NameAsManyEffectsAsAreThere) {
   const Line noise = line(0, 1, 2400);
   const std::set<std::string> two{"wave 0", "wave 1"}, three{"wave 0", "wave 1", "wave 2"},
@@ -104,19 +115,14 @@ class AlikeWaves : public Waves {
 TEST(EffectSets, HoldWhatActsLikeOneOfThem) {
   const AlikeWaves model(line(0, 1, 2400), 3);
   const CauseRanking ranking = ranked(model);
-  const auto evidence = [&](const std::set<std::string>& wanted) {
-    for (const RankedCause& set : ranking.sets) {
-      std::set<std::string> ids;
-      for (const EffectTerm& term : set.terms) ids.insert(term.candidate->id);
-      if (ids == wanted) return set.evidence;
-    }
-    ADD_FAILURE() << "a set was not tried";
-    return 0.0;
-  };
-  EXPECT_NEAR(evidence({"wave 0", "wave 1", "wave 2"}), evidence({"wave 5", "wave 1", "wave 2"}), 6);
+  const RankedCause *first = find_set(ranking.sets, {"wave 0", "wave 1", "wave 2"}),
+                    *other = find_set(ranking.sets, {"wave 5", "wave 1", "wave 2"});
+  ASSERT_TRUE(first && other);
+  EXPECT_NEAR(first->evidence, other->evidence, 6);
 }
 
-// Two waves of which the first is large; wave 5 is the first at its size, and another direction where it is small.
+// Two waves are at work, of which wave 0 is large. Wave 5 has the shape of wave 0 at that size, and another shape where
+// it is small.
 class BentWaves : public Waves {
  public:
   explicit BentWaves(const Line& from) : Waves(from, 2) {
@@ -135,20 +141,15 @@ class BentWaves : public Waves {
   }
 };
 
-// Scores promise little of it beside the second wave. It is as likely alone as the first, and so the pair is tried.
+// The scores promise little of wave 5 beside wave 1. The pair is tried all the same, because wave 5 is as likely alone
+// as wave 0.
 TEST(EffectSets, PairsHoldWhatIsAsLikelyAlone) {
   const BentWaves model(line(0, 1, 2400));
   const CauseRanking ranking = ranked(model);
-  const auto gain = [&](const std::set<std::string>& wanted) {
-    for (const RankedCause& pair : ranking.pairs) {
-      std::set<std::string> ids;
-      for (const EffectTerm& term : pair.terms) ids.insert(term.candidate->id);
-      if (ids == wanted) return pair.gain;
-    }
-    ADD_FAILURE() << "a pair was not tried";
-    return 0.0;
-  };
-  EXPECT_NEAR(gain({"wave 0", "wave 1"}), gain({"wave 5", "wave 1"}), 6);
+  const RankedCause *first = find_set(ranking.pairs, {"wave 0", "wave 1"}),
+                    *other = find_set(ranking.pairs, {"wave 5", "wave 1"});
+  ASSERT_TRUE(first && other);
+  EXPECT_NEAR(first->gain, other->gain, 6);
 }
 
 // The order in which the search met two effects does not decide what the pair is worth: the stronger one comes first.

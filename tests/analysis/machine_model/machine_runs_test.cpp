@@ -74,7 +74,7 @@ TEST_F(LookedOver, HalfOfTheTrialsInDegreesAreSuspected) {
   EXPECT_NE(said().find("x: its values in 10 of 20 trials (trial 11 for one) are "), std::string::npos) << said();
 }
 
-// The median of a trial of another machine is another one, too: its first values tell of the unit alone.
+// Trials of a machine that decays faster have another median as well, so that only their first values show the unit.
 TEST_F(LookedOver, TrialsOfAnotherMachineInDegreesAreSuspectedByWhereTheyBegin) {
   for (std::size_t t = 10; t < 20; ++t)
     for (std::size_t k = 0; k < 12; ++k)

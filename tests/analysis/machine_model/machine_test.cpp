@@ -1,5 +1,5 @@
-// Works side by side ask a machine's map in joint calls, and are told what they would be told alone; what no machine is
-// is refused.
+// Works that run side by side ask a machine's map in joint calls, and get the answers that they would get alone.
+// Machines with bounds that hold no range, and steps that return NaN, are refused.
 
 #include "analysis/machine_model/machine.h"
 

@@ -75,7 +75,8 @@ TEST(ScoreCurve, FindsWhereFailuresBeginAndEnd) {
   EXPECT_NEAR(share([](double z) { return z < -5.3 ? NAN : z; }, 0.25).shares.fails / below(-5.3), 1, 1e-2);
 }
 
-// What happens with a chance of exp(-10) beside the cheapest failure is looked at less closely, and nothing else is.
+// The curve looks less closely for failures that are exp(-10) times as likely as the cheapest one. It looks as closely
+// as before for those that are as likely.
 TEST(ScoreCurve, LooksLessCloselyAtWhatIsRare) {
   const auto fails = [](double z) { return z < -2.123 ? NAN : z; };
   const Shared closely = share(fails, 0.25), near = share(fails, 0.25, 8.5, -20), rare = share(fails, 0.25, 8.5, 8);

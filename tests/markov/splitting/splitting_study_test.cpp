@@ -185,7 +185,8 @@ TEST(SplittingStudy, GivesNoNumberWhereWalksSlipIntoAnotherGaitTooSeldomToSettle
 
 TEST(SplittingStudy, CountsGaitsBetweenWhichWalksSlipOften) {
   const TwoGaits two{.sd = 0.7, .far = 2.6};
-  expect_near(splitting_study(two.batch(), std::vector{-1.0}, quick), two.steps());
+  const SplittingOptions whole{.replicas = 1000, .rounds = 16, .pilots = 4, .tolerance = 0.3, .seed = 3, .threads = 1};
+  expect_near(splitting_study(two.batch(), std::vector{-1.0}, whole), two.steps());
 }
 
 TEST(SplittingStudy, NamesOptionsOutOfRange) {

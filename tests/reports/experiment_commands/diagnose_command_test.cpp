@@ -105,7 +105,8 @@ TEST_F(DiagnoseCommand, NamesTheKnownEffects) {
     EXPECT_NE(ran.err.find(part), std::string::npos) << part << "\n" << ran.err;
 }
 
-// What this law cannot have is left out and said; where nothing is left, it is refused.
+// The diagnosis leaves out an effect that the contact law cannot have, and lists it with the reason. It refuses a
+// catalogue of which no effect is left.
 TEST_F(DiagnoseCommand, SaysWhichEffectsTheModelCannotHave) {
   ASSERT_EQ(
       metastable({"simulate", "--slope", "9.59", "--law", "published", "--trials", "20", "--out", path("wheel")}).code,
