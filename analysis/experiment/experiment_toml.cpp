@@ -306,15 +306,13 @@ std::optional<WalkDescription> parse_walk_toml(const std::string& file, std::str
   WalkDescription walks;
   root.find("system", true);
   walks.title = root.text("title", false).value_or("");
-  const std::optional<Keys> stated = root.table("machine", true);
-  if (!stated) walks.no_walker = defects.lines().back();
-  if (std::optional<Keys> machine = stated) {
-    const std::optional<std::string> model = machine->text("model", true);
-    walks.walker = model.value_or("compass");
-    if (model && walks.walker != "compass" && walks.walker != "simplest")
+  if (std::optional<Keys> machine = root.table("machine", true)) {
+    const std::size_t before = defects.count();
+    walks.walker = machine->text("model", true).value_or("compass");
+    if (walks.walker != "compass" && walks.walker != "simplest")
       machine->report(*machine->find("model", true),
                       fmt::format("machine.model: {} is none of \"compass\", \"simplest\"", shown_text(walks.walker)));
-    if (!model || (walks.walker != "compass" && walks.walker != "simplest")) walks.no_walker = defects.lines().back();
+    if (defects.count() > before) walks.no_walker = defects.lines().back();
     if (std::optional<Keys> known = machine->table("parameters", true)) {
       constexpr Range degrees{.low = 0, .high = 45, .high_open = true};
       walks.slope_deg = known->spread("slope_deg", true, degrees).value_or(Spread{3, 0.1});
@@ -324,6 +322,8 @@ std::optional<WalkDescription> parse_walk_toml(const std::string& file, std::str
       known->finish();
     }
     machine->finish();
+  } else {
+    walks.no_walker = defects.lines().back();
   }
   if (std::optional<Keys> columns = root.table("columns", true)) {
     std::vector<std::string> states{"half_angle_rad", "stance_rate_rad_s"};
