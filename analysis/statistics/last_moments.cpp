@@ -30,6 +30,12 @@ std::vector<Share> merged(std::vector<Share> shares) {
   return different;
 }
 
+double whole_of(const std::vector<Share>& shares) {
+  double all = 0;
+  for (const Share& share : shares) all += share.weight;
+  return all;
+}
+
 /// Interpolates between the middles of the weights.
 double between_middles(const std::vector<Share>& shares, double wanted) {
   double below = 0, last_at = 0;
@@ -74,12 +80,21 @@ Estimate middle_90(std::span<const double> values, std::span<const double> weigh
   if (shares.empty()) throw std::invalid_argument("quantiles: no value has a weight");
   const bool even = std::all_of(shares.begin(), shares.end(), [](const Share& share) { return share.width > 0; });
   if (!even) shares = merged(std::move(shares));
-  double all = 0;
-  for (const Share& share : shares) all += share.weight;
+  const double all = whole_of(shares);
   std::array<double, 3> found{};
   for (std::size_t q = 0; q < levels.size(); ++q)
     found[q] = even ? of_even_shares(shares, levels[q] * all) : between_middles(shares, levels[q] * all);
   return {found[0], found[1], found[2]};
+}
+
+double weighted_quantile(std::span<const double> values, std::span<const double> weights, double level) {
+  if (values.size() != weights.size()) throw std::invalid_argument("quantiles: a weight for each value expected");
+  std::vector<Share> shares;
+  for (std::size_t i = 0; i < values.size(); ++i)
+    if (weights[i] > 0) shares.push_back({values[i], weights[i], 0});
+  if (shares.empty()) throw std::invalid_argument("quantiles: no value has a weight");
+  shares = merged(std::move(shares));
+  return between_middles(shares, level * whole_of(shares));
 }
 
 }  // namespace metastable::analysis

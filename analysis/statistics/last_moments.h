@@ -17,10 +17,20 @@ namespace metastable::analysis {
 Estimate middle_90(std::span<const double> values, std::span<const double> weights,
                    std::span<const double> widths = {});
 
+/// Returns the value below which a share `level`, in [0, 1], of the weight lies, as middle_90() without widths.
+double weighted_quantile(std::span<const double> values, std::span<const double> weights, double level);
+
+/// Holds 95 % intervals of a median and of the two ends of a middle 90 %; their ends are NaN where they are not known.
+struct SpreadIntervals {
+  Estimate median, low, high;
+};
+
 /// Says what steps are like: medians with the middle 90 %.
 struct StepProfile {
   std::vector<Estimate> state;  ///< at the beginning of the step, one a number of the state
   std::vector<Estimate> noise;  ///< met in it
+  /// Say how well these are known, where independent rounds tell it; else empty.
+  std::vector<SpreadIntervals> state_95, noise_95;
   double bound_to_fail =
       0;  ///< mean chance, at its beginning, of failing before being back in the middle of the regime
 };
@@ -37,6 +47,7 @@ struct LastMoments {
   std::vector<StepProfile> last;                      ///< last[0]: the step that fails, last[1]: the one before ...
   StepProfile regime;                                 ///< all steps of the metastable regime
   std::vector<double> by_phase;                       ///< share of the failures in each phase's step; sums to one
+  std::vector<Estimate> by_phase_95;                  ///< likewise with intervals, where rounds tell them; else empty
   std::vector<PathStep> likeliest;                    ///< the most likely last steps, the one that fails at the end
   std::string reason;                                 ///< why there is nothing; empty if there is
 };

@@ -95,6 +95,7 @@ class Run {
     study_.orbit = std::move(around.orbit);
     study_.period = around.period;
     study_.fails_without_noise = around.fails_without_noise;
+    study_.longer_period = around.longer_period;
     study_.frames = std::move(around.frames);
     map_.step = [this, step = map.step](int phase, auto states, auto scores, auto next, auto failed) {
       step(phase, states, scores, next, failed);
@@ -520,20 +521,27 @@ class Run {
   WorkLeft work_;
 };
 
+std::string long_gait_in_words(int period) {
+  if (period == 0) return "";
+  return fmt::format("; without noise it comes back after {} revolutions, where meshes hold gaits of up to {}", period,
+                     longest_period);
+}
+
 MeshStudy study_around(const BatchMap& map, std::span<const double> start, const MeshStudyOptions& options,
                        StudyOrbit around) {
+  const std::string gait = long_gait_in_words(around.longer_period);
   try {
     return Run(map, start, options, std::move(around)).run();
   } catch (const NoFailureFound& error) {
     if (options.simulated_steps == 0) throw;
     const auto [found, fails] = walks_in_words(map, start, walking(options));
-    const std::string text = fmt::format("{}; {}", error.what(), found);
+    const std::string text = fmt::format("{}{}; {}", error.what(), gait, found);
     if (fails) throw Disagreement(text + ": no number is given");
     throw NoFailureFound(text);
   } catch (const ConvergenceError& error) {
     if (options.simulated_steps == 0) throw;
-    throw Disagreement(
-        fmt::format("{}; {}: no number is given", error.what(), walks_in_words(map, start, walking(options)).first));
+    throw Disagreement(fmt::format("{}{}; {}: no number is given", error.what(), gait,
+                                   walks_in_words(map, start, walking(options)).first));
   }
 }
 

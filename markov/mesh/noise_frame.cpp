@@ -18,6 +18,7 @@ using Eigen::MatrixXd;
 using Eigen::VectorXd;
 
 constexpr int revolution_limit = 5000;
+constexpr int longest_told_period = 1000;
 constexpr double orbit_tolerance = 1e-11;
 constexpr double same_state = 1e-7;         // of states that are still led to it
 constexpr double period_tolerance = 1e-11;  // of a state that has come back
@@ -216,6 +217,25 @@ std::optional<PeriodicGait> periodic_gait(const BatchMap& map, std::span<const d
   } catch (const MapError&) {  // it ends there: there is no gait to find
   }
   return std::nullopt;
+}
+
+int longer_period(const BatchMap& map, std::span<const double> start) {
+  const Probe probe(map);
+  const VectorXd quiet = VectorXd::Zero(map.scores);
+  VectorXd state = beside(map, start), settled;
+  int first = 0;  // return after the settled state
+  try {
+    for (int revolution = 1; revolution <= revolution_limit + 2 * longest_told_period; ++revolution) {
+      for (int phase = 0; phase < map.phases; ++phase) state = probe(phase, state, quiet, "without noise it fails");
+      const int since = revolution - revolution_limit;
+      if (since == 0) settled = state;
+      if (since <= 0 || first_return({settled}, state, same_state) == 0) continue;
+      if (first > 0) return since == 2 * first && first > longest_period ? first : 0;  // a chance is not met twice
+      first = since;
+    }
+  } catch (const MapError&) {  // it ends there
+  }
+  return 0;
 }
 
 std::vector<NoiseFrame> common_frames(const std::vector<NoiseFrame>& frames, int phases) {

@@ -62,6 +62,10 @@ struct PeriodicGait {
 /// may be unstable. Returns nothing where that fails within 5000 revolutions, or has no period up to longest_period.
 std::optional<PeriodicGait> periodic_gait(const BatchMap& map, std::span<const double> start);
 
+/// Follows the map likewise, and returns the period [revolutions] of an orbit that comes back more seldom than
+/// longest_period, but within 1000; 0: there is none.
+int longer_period(const BatchMap& map, std::span<const double> start);
+
 /// Returns one frame for each of the first `phases` of frames that follow one another in turns: of the mean of their
 /// covariances, around the centre of the first.
 std::vector<NoiseFrame> common_frames(const std::vector<NoiseFrame>& frames, int phases);

@@ -80,6 +80,7 @@ std::optional<StudyOrbit> orbit_of_walk(const BatchMap& map, std::span<const dou
   return StudyOrbit{.orbit = {walk->frames, {}},
                     .period = 0,
                     .fails_without_noise = walk->fails_after,
+                    .longer_period = walk->fails_after > 0 ? 0 : longer_period(map, start),
                     .frames = walk->frames,
                     .own = {walk->frames.front().centre}};
 }

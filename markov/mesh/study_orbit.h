@@ -15,6 +15,7 @@ struct StudyOrbit {
   NoiseFreeOrbit orbit;
   int period = 1;                         ///< MeshStudy::period
   std::uint64_t fails_without_noise = 0;  ///< MeshStudy::fails_without_noise
+  int longer_period = 0;                  ///< MeshStudy::longer_period
   std::vector<NoiseFrame> frames;         ///< of the meshes
   GaitOrbit own;                          ///< states of phase 0 of a revolution of the meshes
   int revolutions = 1;                    ///< of the map that are one of the meshes

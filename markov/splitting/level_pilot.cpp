@@ -35,10 +35,12 @@ class Pilot {
 
   LevelPilot run() {
     if (!settle()) return finish(true);
-    const std::uint64_t window = revolutions(1.5 * pilot_.mixing_steps);
-    pilot_.window = window;
-    if (!options_.level && -std::log(ensemble_.survival()) > frequent_failures * static_cast<double>(ensemble_.steps()))
+    pilot_.window = revolutions(1.5 * pilot_.mixing_steps);
+    if (!(options_.level && options_.always) &&
+        -std::log(ensemble_.survival()) > frequent_failures * static_cast<double>(ensemble_.steps()))
       return finish(false);
+    const std::uint64_t window = std::max(pilot_.window, revolutions(static_cast<double>(options_.window)));
+    pilot_.window = window;
     Levels levels{options_.level ? options_.level : distance_level(frames_, map_.dimension), {}};
     const std::uint64_t failed_before = ensemble_.failures(), calls_before = calls();
     std::uint64_t failed = 0;

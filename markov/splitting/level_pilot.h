@@ -19,6 +19,8 @@ inline constexpr double hardly_any = 1e-6;
 
 struct PilotOptions {
   LevelFunction level = {};  ///< to split by; empty: the distance from what is visited, then what is learnt
+  int window = 0;            ///< of a level that is given, the steps that a failure takes; 0: not known
+  bool always = false;       ///< splits by a level that is given even where replicas fail often
   std::size_t replicas = 1000;
   std::uint64_t most_calls = 10000000;
   std::uint64_t seed = 1, stream = 0;
@@ -36,7 +38,7 @@ struct LevelPilot {
 
 /// Lets an ensemble spread, first by its distance from where it mostly is, until replicas fail; then learns from what
 /// it visited the chance of failing within 1.5 mixing times (learn_level), spreads it by that, and learns again, three
-/// times in all. Where replicas fail in 0.003 of all steps and more it learns nothing.
+/// times in all. Where replicas fail in 0.003 of all steps and more it learns nothing, and splits nothing unless asked.
 /// @throws NoSplitting where no replica fails within most_calls; MapError as WeightedEnsemble
 LevelPilot level_pilot(const BatchMap& map, std::span<const double> start, const PilotOptions& options);
 

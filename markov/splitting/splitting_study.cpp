@@ -16,6 +16,7 @@
 
 #include "markov/parallel.h"
 #include "markov/splitting/level_pilot.h"
+#include "markov/splitting/mesh_level.h"
 #include "markov/splitting/start_gait.h"
 
 namespace metastable::markov {
@@ -25,7 +26,6 @@ constexpr double fewest_lines = 30;
 constexpr double shortest_burn_in = 30;  // steps, as memory that is not linear is seen in part only
 constexpr double refused_level = 1e-3;
 constexpr std::size_t walks_of_a_round = 1000;  // that failed, whose last steps are kept
-constexpr double widest = 4;                    // upper over lower end of an interval that is given
 // These numbers say when walks that slip into another gait leave no number. A slip a thousand times rarer than failure
 // changes the expected steps by a thousandth for each time that walks last as long again in the other gait.
 constexpr double much_rarer = 7;            // ln 1000
@@ -42,34 +42,14 @@ struct Round {
   std::vector<double> states, weights;  ///< at the end of the burn-in
 };
 
-/// Holds a number and its standard error.
-struct Measured {
-  double value = 0, standard_error = 0;
-};
-
-/// Takes the ratio of two means over rounds, with the jackknife's error.
-Measured ratio_of_means(std::span<const double> over, std::span<const double> under) {
-  const double n = static_cast<double>(over.size());
-  const double a = std::accumulate(over.begin(), over.end(), 0.0), b = std::accumulate(under.begin(), under.end(), 0.0);
-  double mean = 0, squares = 0;
-  std::vector<double> without;
-  for (std::size_t r = 0; r < over.size(); ++r) without.push_back((a - over[r]) / (b - under[r]));
-  for (const double one : without) mean += one / n;
-  for (const double one : without) squares += (one - mean) * (one - mean);
-  return {a / b, std::sqrt((n - 1) / n * squares)};
-}
-
-/// Holds what rounds say together.
-struct Pooled {
-  double steps = 0, rate = 0;
-};
-
 class Study {
  public:
   Study(const BatchMap& map, std::span<const double> start, const SplittingOptions& options)
       : map_(map), start_(start), options_(options) {}
 
   SplittingStudy run() {
+    level_ = options_.level;
+    if (options_.level_of_mesh) take_level_of_mesh();
     if (!begin()) return walk_until_all_fail();
     const std::uint64_t revolution = static_cast<std::uint64_t>(map_.phases);
     for (;;) {
@@ -86,6 +66,7 @@ class Study {
       if (!walk(whole(std::min(wanted * taken, affordable), 2 * revolution))) return walk_until_all_fail();
     }
     judge();
+    tell_survival();
     if (options_.last_steps > 0) tell_failing();
     return std::move(found_);
   }
@@ -132,13 +113,21 @@ class Study {
   /// Returns the stream of a pilot or a round.
   std::uint64_t stream(std::uint64_t number) const { return attempt_ * streams_of_an_attempt + number; }
 
+  void take_level_of_mesh() {
+    tell(0);
+    MeshLevel read = mesh_level(map_, start_, {.seed = options_.seed});
+    level_ = std::move(read.level), found_.level_window = read.window, found_.level_nodes = read.nodes;
+    found_.pilot_calls = calls_ = read.calls;
+  }
+
   void learn() {
     mixing_ = 0, window_ = 1;
     pilots_.assign(static_cast<std::size_t>(options_.pilots), {});
     const auto told = one_at_a_time([this] { tell(0); });
     parallel_for(pilots_.size(), options_.threads, [&](std::size_t k) {
       pilots_[k] = level_pilot(map_, start_,
-                               {.level = options_.level,
+                               {.level = level_,
+                                .always = bool{options_.level},
                                 .replicas = options_.replicas,
                                 .most_calls = options_.most_calls / 4 / pilots_.size(),
                                 .seed = options_.seed,
@@ -151,6 +140,8 @@ class Study {
       calls_ += pilot.calls;
       found_.pilot_calls += pilot.calls;
     }
+    if (std::ranges::any_of(pilots_, [](const LevelPilot& pilot) { return bool{pilot.levels.level}; }))
+      found_.split_by = options_.level_of_mesh ? SplitBy::mesh : options_.level ? SplitBy::given : SplitBy::learnt;
   }
 
   /// Returns whether walks are left in all rounds.
@@ -212,6 +203,7 @@ class Study {
       }
     });
     found_.all_failed = true;
+    found_.split_by = SplitBy::nothing;
     burn_in_ = 0;
     for (const Round& round : rounds_) burn_in_ = std::max<std::uint64_t>(burn_in_, round.early.size());
     for (Round& round : rounds_) round.early.resize(burn_in_, 1.0);
@@ -219,60 +211,18 @@ class Study {
     count_calls();
     estimate();
     judge();
-    if (options_.last_steps > 0)
-      for (const Round& round : rounds_) found_.failing.add(round.ensemble->failing());
+    tell_survival();
+    for (std::size_t r = 0; options_.last_steps > 0 && r < rounds_.size(); ++r) add_failing(rounds_[r]);
     return std::move(found_);
   }
 
-  /// Returns the mean share that fails at each phase, of one round, over [first, last) of its steps.
-  std::vector<double> shares_by_phase(const Round& round, std::size_t first, std::size_t last) const {
+  /// Returns the mean share that fails at each phase, of one round, after its burn-in.
+  std::vector<double> shares_by_phase(const Round& round) const {
     const auto phases = static_cast<std::size_t>(map_.phases);
     std::vector<double> sum(phases, 0);
-    for (std::size_t n = first; n < last; ++n) sum[n % phases] += round.shares[n];
-    for (double& one : sum) one /= static_cast<double>((last - first) / phases);
+    for (std::size_t n = 0; n < round.shares.size(); ++n) sum[n % phases] += round.shares[n];
+    for (double& one : sum) one /= static_cast<double>(round.shares.size() / phases);
     return sum;
-  }
-
-  /// Pools all rounds but one (or none: left_out = rounds).
-  Pooled pooled(std::size_t left_out, std::vector<double>* survival = nullptr) const {
-    const auto phases = static_cast<std::size_t>(map_.phases);
-    const double count = static_cast<double>(rounds_.size()) - (left_out < rounds_.size() ? 1 : 0);
-    std::vector<double> alive(burn_in_ + 1, 0), share(phases, 0);
-    for (std::size_t r = 0; r < rounds_.size(); ++r) {
-      if (r == left_out) continue;
-      double now = 1;
-      for (std::size_t n = 0; n <= burn_in_; ++n) {
-        alive[n] += now / count;
-        if (n < burn_in_) now *= 1 - rounds_[r].early[n];
-      }
-      const std::vector<double> own = shares_by_phase(rounds_[r], 0, rounds_[r].shares.size());
-      for (std::size_t p = 0; p < phases; ++p) share[p] += own[p] / count;
-    }
-    Pooled all;
-    for (std::size_t n = 0; n < burn_in_; ++n) all.steps += alive[n];
-    double now = 1, walked = 0, failed = 0;
-    for (const double one : share) {
-      walked += now;
-      failed += now * one;
-      now *= 1 - one;
-    }
-    if (survival) survival->assign(alive.begin() + 1, alive.end());
-    if (found_.all_failed) return {all.steps, std::numeric_limits<double>::quiet_NaN()};
-    all.steps += alive[burn_in_] * walked / failed;
-    all.rate = phases == 1 ? share[0] : -std::expm1(std::log1p(-failed) / static_cast<double>(phases));
-    return all;
-  }
-
-  /// Takes the interval of a logarithm from the jackknife's values, one a round.
-  MeshEstimate interval(double value, const std::vector<double>& without) const {
-    const double n = static_cast<double>(without.size());
-    std::vector<double> own;
-    double mean = 0, squares = 0;
-    for (const double one : without) own.push_back(n * std::log(value) - (n - 1) * std::log(one));
-    for (const double one : own) mean += one / n;
-    for (const double one : own) squares += (one - mean) * (one - mean);
-    const double half = boost::math::quantile(boost::math::students_t(n - 1), 0.975) * std::sqrt(squares / (n - 1) / n);
-    return {value, value * std::exp(-half), value * std::exp(half)};
   }
 
   /// Returns an interval that is no narrower than each earlier one would be at the steps taken by now. The rounds end
@@ -292,30 +242,41 @@ class Study {
     found_.round_steps = burn_in_ + rounds_.front().shares.size();
     found_.calls = calls_;
     found_.mixing_steps = mixing_ / -std::log(left_of_memory);
-    const Pooled all = pooled(rounds_.size(), &found_.survival);
-    std::vector<double> steps, rates;
+    std::vector<RoundShares> shares;
     found_.rates.clear();
-    for (std::size_t r = 0; r < rounds_.size(); ++r) {
-      const Pooled others = pooled(r);
-      steps.push_back(others.steps);
-      rates.push_back(others.rate);
+    for (const Round& round : rounds_) {
+      shares.push_back({round.early, found_.all_failed ? std::vector<double>() : shares_by_phase(round)});
       if (found_.all_failed) continue;
       double mean = 0;
-      for (const double one : rounds_[r].shares) mean += one;
-      found_.rates.push_back(mean / static_cast<double>(rounds_[r].shares.size()));
+      for (const double one : round.shares) mean += one;
+      found_.rates.push_back(mean / static_cast<double>(round.shares.size()));
     }
+    found_.pool = PooledRounds(std::move(shares));
     double sum = 0, squares = 0;
     for (const Round& round : rounds_)
       for (const double weight : round.ensemble->lines()) sum += weight, squares += weight * weight;
     found_.lines = squares > 0 ? sum * sum / squares : 0;
-    found_.steps = unchosen(interval(all.steps, steps), scatter_of_steps_);
-    found_.failure_rate = unchosen(interval(all.rate, rates), scatter_of_rate_);
+    found_.steps = unchosen(found_.pool.steps(), scatter_of_steps_);
+    const MeshEstimate rate = found_.pool.failure_rate();
+    found_.failure_rate = unchosen(rate, scatter_of_rate_);
+    found_.widened =
+        std::log(found_.failure_rate.upper / found_.failure_rate.lower) / std::log(rate.upper / rate.lower);
+    if (!(found_.widened >= 1 && std::isfinite(found_.widened))) found_.widened = 1;
+  }
+
+  void tell_survival() {
+    for (std::uint64_t n = 1; n <= burn_in_; ++n) found_.survival.push_back(survival_after(found_, n));
+  }
+
+  void add_failing(const Round& round) {
+    found_.failing.add(round.ensemble->failing());
+    found_.failing_ends.push_back(found_.failing.size());
   }
 
   // Rounds count alike: each has walked as many steps.
   void tell_failing() {
     for (const Round& round : rounds_) {
-      found_.failing.add(round.ensemble->failing());
+      add_failing(round);
       for (int p = 0; p < map_.phases; ++p) {
         const auto states = round.ensemble->states();
         const auto weights = round.ensemble->weights();
@@ -323,6 +284,7 @@ class Study {
         found_.regime_weights.insert(found_.regime_weights.end(), weights.begin(), weights.end());
         if (p + 1 < map_.phases) round.ensemble->advance();
       }
+      found_.regime_ends.push_back(found_.regime_weights.size());
     }
   }
 
@@ -333,7 +295,7 @@ class Study {
           "splitting: {:.3g} independent lines of descent lead to failure in {} steps of the map, where {} are the "
           "fewest that vouch for a number",
           found_.lines, found_.calls, fewest_lines);
-    else if (!(ratio <= widest))
+    else if (!(ratio <= widest_interval))
       found_.disagreement = fmt::format(
           "splitting: {} rounds of {} steps say {:.3g} to {:.3g} steps: they lie too far apart for a number",
           found_.rounds, found_.round_steps, found_.steps.lower, found_.steps.upper);
@@ -391,8 +353,8 @@ class Study {
           where, found_.round_steps, heat);
       return;
     }
-    const Measured grown = ratio_of_means(after, before);
-    const double changed = std::abs(grown.value - 1), error = 2 * grown.standard_error;
+    const RatioOfSums grown = ratio_of_sums(after, before);
+    const double changed = std::abs(grown.value - 1), error = 2 * standard_error(grown);
     if (changed + error < settled_growth) return;
     found_.disagreement = fmt::format(
         "splitting: of the walks {:.2g} % are in another gait, at {}, after {} steps, and {:.2g} % after {}: {}",
@@ -463,6 +425,7 @@ class Study {
   const BatchMap& map_;
   std::span<const double> start_;
   const SplittingOptions& options_;
+  LevelFunction level_;  ///< given, or a mesh's; empty: learnt
   std::vector<LevelPilot> pilots_;
   std::vector<Round> rounds_;
   double mixing_ = 0, scatter_of_steps_ = 0, scatter_of_rate_ = 0;
@@ -474,6 +437,10 @@ class Study {
 
 MeshEstimate steps_from_quasi_stationary(const SplittingStudy& study) {
   return {1 / study.failure_rate.value, 1 / study.failure_rate.upper, 1 / study.failure_rate.lower};
+}
+
+MeshEstimate survival_after(const SplittingStudy& study, std::uint64_t steps) {
+  return study.pool.survival_after(steps, study.widened);
 }
 
 void require_agreement(const SplittingStudy& study, const std::string& what) {
@@ -490,6 +457,8 @@ SplittingStudy splitting_study(const BatchMap& map, std::span<const double> star
   for (std::size_t k = 0; k < start.size(); ++k)
     if (!std::isfinite(start[k]))
       throw std::invalid_argument(fmt::format("start: number {} is {}, a finite number expected", k + 1, start[k]));
+  if (options.level && options.level_of_mesh)
+    throw std::invalid_argument("splitting: a level function or a mesh's level expected, not both");
   if (!(options.tolerance > 0))
     throw std::invalid_argument(fmt::format("splitting: a tolerance of {}, above 0 expected", options.tolerance));
   if (options.replicas == 0) {

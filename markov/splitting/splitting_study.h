@@ -9,16 +9,18 @@
 
 #include "markov/mesh/batch_map.h"
 #include "markov/mesh/mesh_study.h"
+#include "markov/splitting/pooled_rounds.h"
 #include "markov/splitting/weighted_ensemble.h"
 
 namespace metastable::markov {
 
 struct SplittingOptions {
-  LevelFunction level = {};  ///< that ensembles are split by; empty: learnt
-  std::size_t replicas = 0;  ///< of one ensemble, >= 100; 0: 1000, of a tolerance above 0.05 50 / tolerance, >= 200
-  int rounds = 16;           ///< independent ensembles, >= 8, a multiple of the pilots
-  int pilots = 4;            ///< that each learn a level of their own, >= 1
-  double tolerance = 0.05;   ///< wanted half-width of the 95 % interval of ln steps, > 0
+  LevelFunction level = {};    ///< that ensembles are split by; empty: learnt, or a mesh's
+  bool level_of_mesh = false;  ///< a mesh's (mesh_level()) instead of a learnt one, in up to four dimensions
+  std::size_t replicas = 0;    ///< of one ensemble, >= 100; 0: 1000, of a tolerance above 0.05 50 / tolerance, >= 200
+  int rounds = 16;             ///< independent ensembles, >= 8, a multiple of the pilots
+  int pilots = 4;              ///< that each learn a level of their own, >= 1
+  double tolerance = 0.05;     ///< wanted half-width of the 95 % interval of ln steps, > 0
   std::uint64_t most_calls = 400000000;  ///< rows that the map is asked for, in all
   std::uint64_t seed = 1;
   int threads = 0;             ///< 0: all cores; the bits do not depend on it
@@ -28,11 +30,20 @@ struct SplittingOptions {
   std::function<void(double)> progress = {};
 };
 
+/// Says what ensembles are split by.
+enum class SplitBy {
+  nothing,  ///< failures are frequent
+  given,    ///< a level function
+  learnt,
+  mesh
+};
+
 struct SplittingStudy {
-  MeshEstimate steps;            ///< expected steps before failure from the start
-  MeshEstimate failure_rate;     ///< a step, from the quasi-stationary distribution
-  double mixing_steps = 0;       ///< e-folding of what is remembered of a state, by a regression of ranks
-  std::vector<double> survival;  ///< [k]: share that walks on after k + 1 steps; beyond the last at the failure rate
+  MeshEstimate steps;         ///< expected steps before failure from the start
+  MeshEstimate failure_rate;  ///< a step, from the quasi-stationary distribution
+  double mixing_steps = 0;    ///< e-folding of what is remembered of a state, by a regression of ranks
+  /// Holds the shares that walk on after 1, 2, ... steps, through the burn-in; beyond see survival_after().
+  std::vector<MeshEstimate> survival;
   /// Walks fail before the start is forgotten (less than 1e-6 of a step is left to expect). Then steps are counted,
   /// nothing is split, and there are no survivors to speak of: the failure rate and the mixing steps are NaN, and
   /// `rates` is empty.
@@ -41,17 +52,29 @@ struct SplittingStudy {
   std::uint64_t round_steps = 0;  ///< that each took
   std::uint64_t calls = 0;        ///< rows that the map was asked for, those of the pilots included
   std::uint64_t pilot_calls = 0;
-  double lines = 0;           ///< independent lines of descent that lead to failure: (sum w)^2 / sum w^2
-  std::vector<double> rates;  ///< of each round
-  FailingWalks failing;       ///< of all rounds, some thousands at most; weights are even but for rounding
+  SplitBy split_by = SplitBy::nothing;
+  std::size_t level_nodes = 0;  ///< of a mesh whose level they are split by
+  int level_window = 0;         ///< [steps] within which its level foretells failure
+  double lines = 0;             ///< independent lines of descent that lead to failure: (sum w)^2 / sum w^2
+  std::vector<double> rates;    ///< of each round
+  FailingWalks failing;         ///< of all rounds, some thousands at most; weights are even in each round
   /// Holds states of the metastable regime [n x dimension] and their weights, of a revolution of phases.
   std::vector<double> regime_states, regime_weights;
+  /// Say how many of these stand before the end of each round: round by round one after another.
+  std::vector<std::size_t> failing_ends, regime_ends;
+  PooledRounds pool;   ///< for survival_after()
+  double widened = 1;  ///< the interval of the rate over that of the last look alone
   /// Empty, or a sentence that says why `steps` must not be used.
   std::string disagreement;
 };
 
 /// Returns the expected steps of survivors who have forgotten the start: one over the failure rate.
 MeshEstimate steps_from_quasi_stationary(const SplittingStudy& study);
+
+/// Returns the share that walks on after so many steps, from the start. Its interval is wider in proportion where that
+/// of the failure rate is. The ends are NaN where the rounds lie too far apart (odds_interval), as where few have seen
+/// a failure so early, and the share, too, where all walks have failed by then.
+MeshEstimate survival_after(const SplittingStudy& study, std::uint64_t steps);
 
 /// Lets `pilots` ensembles explore and learn what to split by, and `rounds` independent ones be split by that. Each
 /// starts at `start`, is followed through a burn-in of three mixing times or two windows, which tells how survival
@@ -69,7 +92,7 @@ MeshEstimate steps_from_quasi_stationary(const SplittingStudy& study);
 /// settled: it may change by less than a tenth, two standard errors included, from the end of the burn-in to that of
 /// the rounds. Maps that draw for themselves cannot be followed without noise: of these no other gait is seen.
 /// @throws std::invalid_argument for options out of range; NoSplitting where no replica fails, saying after how
-/// many steps of the map; MapError as WeightedEnsemble
+/// many steps of the map; MapError as WeightedEnsemble; as mesh_level() for a mesh's level
 SplittingStudy splitting_study(const BatchMap& map, std::span<const double> start,
                                const SplittingOptions& options = {});
 

@@ -46,8 +46,10 @@ Command steps() {
           declare_steps,
           [](const Options& o, const std::string& line) {
             if (asks_for_walker(o)) {
-              WalkerRequest walker = walker_request(o, line, {"how-it-fails", "time-limit", "method", "tolerance"});
+              WalkerRequest walker =
+                  walker_request(o, line, {"how-it-fails", "time-limit", "method", "tolerance", "level"});
               walker.method = walker_method(o);
+              walker.level = walker_level(o, walker.method);
               walker.splitting = splitting_options(o);
               walker.time_limit = o.number("time-limit");
               walker.how_it_fails = o.flag("how-it-fails");

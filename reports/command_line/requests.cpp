@@ -34,6 +34,7 @@ void declare_steps(Options& o) {
         "rigid bodies where the number is there. Results do not depend on it",
         time_limits);
   add_walker(o, "DEG");
+  add_level(o);
 }
 
 StepsRequest steps_request(const Options& o, const analysis::Setting& setting, const std::string& line) {

@@ -78,7 +78,7 @@ void add_walker(Options& o, const std::string& sd, bool meshes) {
 
 bool asks_for_walker(const Options& o) {
   if (o.given("walker")) return true;
-  for (const char* name : {"slope-sd", "terrain", "spacing", "simulated-steps", "memory"})
+  for (const char* name : {"slope-sd", "terrain", "spacing", "simulated-steps", "memory", "level"})
     if (o.has(name) && o.given(name))
       throw std::invalid_argument(fmt::format("--{}: has a meaning with --walker only", name));
   return false;
@@ -123,6 +123,20 @@ markov::SplittingOptions splitting_options(const Options& o) {
   splitting.threads = o.threads();
   if (o.given("tolerance")) splitting.tolerance = o.number("tolerance");
   return splitting;
+}
+
+void add_level(Options& o) {
+  o.add(
+      "level", "learnt|mesh", "learnt",
+      "With --walker: what splitting splits by, the chance of failing as it learns it, in any dimension, or as a mesh "
+      "has it, in up to four");
+}
+
+WalkerLevel walker_level(const Options& o, WalkerMethod method) {
+  if (!o.given("level")) return WalkerLevel::learnt;
+  if (method == WalkerMethod::mesh)
+    throw std::invalid_argument("--level: has a meaning under --method splitting and auto only");
+  return o.text("level") == "mesh" ? WalkerLevel::mesh : WalkerLevel::learnt;
 }
 
 WalkerRequest walker_request(const Options& o, const std::string& command_line, std::vector<std::string> own) {

@@ -28,6 +28,9 @@ markov::MeshStudyOptions mesh_options(const Options& options, const std::vector<
 /// @throws std::invalid_argument for a method that walkers lack, and for options that mean nothing under it
 WalkerMethod walker_method(const Options& options);
 markov::SplittingOptions splitting_options(const Options& options);
+/// Adds --level, and reads it. @throws std::invalid_argument for methods that do not split
+void add_level(Options& options);
+WalkerLevel walker_level(const Options& options, WalkerMethod method);
 /// @throws std::invalid_argument for a parameter to be solved for that is neither "slope" nor "slope-sd"
 void require_walker_parameter(const std::string& name);
 /// Reads the setting of a walker of which one of the two, "slope" or "slope-sd", is not given but solved for.

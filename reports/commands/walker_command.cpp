@@ -42,6 +42,11 @@ Provenance walker_provenance(const WalkerRequest& request) {
 
 }  // namespace
 
+markov::SplittingOptions with_level(markov::SplittingOptions options, WalkerLevel level) {
+  options.level_of_mesh = !options.level && level == WalkerLevel::mesh;
+  return options;
+}
+
 std::optional<SplittingAnswer> ask_both_ways(WalkerMethod method, const std::string& name,
                                              const std::function<const markov::MeshStudy*()>& mesh,
                                              const std::function<markov::SplittingStudy()>& split) {
@@ -89,7 +94,7 @@ WalkerAnswer answer_walker_steps(const WalkerRequest& request, const BeginPart& 
         return &answer.studies.front().passage;
       },
       [&] {
-        markov::SplittingOptions splitting = request.splitting;
+        markov::SplittingOptions splitting = with_level(request.splitting, request.level);
         splitting.last_steps = request.how_it_fails ? analysis::steps_of_a_fall : 0;
         return agreed_splitting(setting.describe(), splitting, begin("splitting"),
                                 [&](const auto& options) { return analysis::split_walker(setting, options); });

@@ -24,12 +24,19 @@ enum class WalkerMethod {
   both  ///< a mesh where it can be had, and splitting beside it
 };
 
+/// Says what splitting splits by.
+enum class WalkerLevel { learnt, mesh };
+
+/// Returns the options of splitting with that level; a level function of the user's stays.
+markov::SplittingOptions with_level(markov::SplittingOptions options, WalkerLevel level);
+
 /// Holds what all of them have.
 struct WalkerRequest {
   std::vector<analysis::WalkerSetting> settings;  ///< one or more
   markov::MeshStudyOptions study;
   WalkerMethod method = WalkerMethod::mesh;                  ///< of steps
   markov::SplittingOptions splitting = {};                   ///< likewise
+  WalkerLevel level = WalkerLevel::learnt;                   ///< likewise
   std::string json;                                          ///< file, "-" for standard output, "" for none
   std::string out;                                           ///< file of a sweep, folder of trials or of a report
   std::string command;                                       ///< the command line, for provenance

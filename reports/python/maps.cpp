@@ -33,10 +33,21 @@ py::array survival_array(const std::vector<double>& shares) {
   return array_of(std::move(survival));
 }
 
+// Says how long something walks by splitting: shares that walk on, and the ends of their intervals, NaN where unknown.
+void tell_survival(const markov::SplittingStudy& study, py::dict& arrays) {
+  std::vector<double> shares, ends{1, 1};
+  for (const markov::MeshEstimate& one : study.survival)
+    shares.push_back(one.value), ends.push_back(one.lower), ends.push_back(one.upper);
+  arrays["survival"] = survival_array(shares);
+  arrays["survival_interval_95"] =
+      array_of(std::move(ends)).reshape(std::vector<py::ssize_t>{static_cast<py::ssize_t>(shares.size()) + 1, 2});
+}
+
 struct Asked {
   markov::MeshStudyOptions mesh;
   markov::SplittingOptions splitting;
   WalkerMethod method = WalkerMethod::mesh;
+  WalkerLevel level = WalkerLevel::learnt;
 };
 
 // Reads what a walker of the library or of one's own is asked, as `steps` and `compare` do.
@@ -49,8 +60,9 @@ Asked asked_of(const Arguments& given, bool several = false) {
   if (several) {
     asked.mesh = mesh_options(*options, {});
   } else {
-    asked.mesh = mesh_options(*options, {"how-it-fails", "time-limit", "method", "tolerance"});
+    asked.mesh = mesh_options(*options, {"how-it-fails", "time-limit", "method", "tolerance", "level"});
     asked.method = walker_method(*options);
+    asked.level = walker_level(*options, asked.method);
     asked.splitting = splitting_options(*options);
     if (asked.method == WalkerMethod::splitting && given.given("guided_samples"))
       throw std::invalid_argument("guided_samples: has no meaning with method \"splitting\"");
@@ -70,6 +82,7 @@ WalkerRequest walker_request_of(const py::list& settings, const Arguments& given
   const Asked asked = asked_of(given, settings.size() > 1);
   request.study = asked.mesh;
   request.method = asked.method;
+  request.level = asked.level;
   request.splitting = asked.splitting;
   request.command = command;
   request.how_it_fails = given.flag("how_it_fails");
@@ -94,9 +107,10 @@ py::dict study_walkers(const py::list& settings, const py::dict& options, const 
   if (found.splitting && found.studies.empty())
     tables.push_back(splitting_table(*found.splitting, {command, {}, request.study.seed, version()}));
   py::dict arrays;
-  if (request.settings.size() == 1)
-    arrays["survival"] = survival_array(found.studies.empty() ? found.splitting->passage.survival
-                                                              : found.studies.front().passage.survival);
+  if (request.settings.size() == 1 && found.studies.empty())
+    tell_survival(found.splitting->passage, arrays);
+  else if (request.settings.size() == 1)
+    arrays["survival"] = survival_array(found.studies.front().passage.survival);
   return answer(walker_answer_json(request, found), walker_answer_text(request, found, line_width), tables_html(tables),
                 arrays);
 }
@@ -195,7 +209,8 @@ py::dict study_map(const py::dict& fields, const py::dict& options, const std::s
         },
         [&] {
           asked.splitting.last_steps = how_it_fails ? analysis::steps_of_a_fall : 0;
-          return agreed_splitting(python.name, asked.splitting, begin("splitting"), [&](const auto& options) {
+          const markov::SplittingOptions splitting = with_level(asked.splitting, asked.level);
+          return agreed_splitting(python.name, splitting, begin("splitting"), [&](const auto& options) {
             return markov::splitting_study(map, python.start, options);
           });
         });
@@ -208,7 +223,10 @@ py::dict study_map(const py::dict& fields, const py::dict& options, const std::s
   });
   const Provenance provenance{command, python.name, asked.mesh.seed, version()};
   py::dict arrays;
-  arrays["survival"] = survival_array(on_mesh ? found.passage.survival : splitting->passage.survival);
+  if (on_mesh)
+    arrays["survival"] = survival_array(found.passage.survival);
+  else
+    tell_survival(splitting->passage, arrays);
   if (!on_mesh)
     return answer(splitting_json(*splitting, moments, provenance), splitting_text(*splitting, moments, line_width),
                   to_html(splitting_table(*splitting, provenance)), arrays);

@@ -31,16 +31,23 @@ std::vector<Cell> profile_row(const std::string& name, const StepProfile& profil
   return row;
 }
 
-Json spreads_json(const std::vector<std::string>& names, const std::vector<Estimate>& spreads) {
+Json ends_json(const Estimate& e) { return std::isfinite(e.lower) ? Json{e.lower, e.upper} : Json(nullptr); }
+
+Json spreads_json(const std::vector<std::string>& names, const std::vector<Estimate>& spreads,
+                  const std::vector<analysis::SpreadIntervals>& known) {
   Json json = Json::object();
-  for (std::size_t i = 0; i < names.size(); ++i)
+  for (std::size_t i = 0; i < names.size(); ++i) {
     json[names[i]] = {{"median", spreads[i].value}, {"middle_90", {spreads[i].lower, spreads[i].upper}}};
+    if (known.empty()) continue;
+    json[names[i]]["median_interval_95"] = ends_json(known[i].median);
+    json[names[i]]["middle_90_intervals_95"] = {ends_json(known[i].low), ends_json(known[i].high)};
+  }
   return json;
 }
 
 Json profile_json(const LastMoments& moments, const StepProfile& profile) {
-  return {{"state", spreads_json(moments.state_names, profile.state)},
-          {"noise", spreads_json(moments.noise_names, profile.noise)},
+  return {{"state", spreads_json(moments.state_names, profile.state, profile.state_95)},
+          {"noise", spreads_json(moments.noise_names, profile.noise, profile.noise_95)},
           {"bound_to_fail", std::isnan(profile.bound_to_fail) ? Json(nullptr) : Json(profile.bound_to_fail)}};
 }
 
@@ -49,13 +56,43 @@ std::string numbers(const std::vector<double>& values) { return fmt::format("{:.
 // Says whether walks tell it, who do not know what they are bound to.
 bool followed(const LastMoments& moments) { return std::isnan(moments.regime.bound_to_fail); }
 
+// Lists the medians again, with the intervals that rounds give them.
+Table medians_table(const LastMoments& moments) {
+  Table table{
+      .id = "last-steps-medians", .title = "The medians, with 95 % intervals from the rounds", .columns = {{"step"}}};
+  for (const auto* names : {&moments.state_names, &moments.noise_names})
+    for (const std::string& name : *names) table.columns.push_back({.name = name});
+  const auto row = [](const std::string& name, const StepProfile& profile) {
+    std::vector<Cell> cells{name};
+    for (const auto* known : {&profile.state_95, &profile.noise_95})
+      for (const analysis::SpreadIntervals& one : *known)
+        if (!std::isfinite(one.median.lower))
+          cells.emplace_back("not known");
+        else if (one.median.lower == one.median.upper)
+          cells.emplace_back(one.median.value);
+        else
+          cells.emplace_back(one.median);
+    return cells;
+  };
+  for (std::size_t k = moments.last.size(); k-- > 0;) table.rows.push_back(row(step_name(k), moments.last[k]));
+  table.rows.push_back(row("all steps of the regime", moments.regime));
+  return table;
+}
+
+std::string phase_share(const LastMoments& moments, std::size_t p) {
+  const std::string share = fmt::format("{:.3g} %", 100 * moments.by_phase[p]);
+  if (moments.by_phase_95.empty() || !std::isfinite(moments.by_phase_95[p].lower)) return share;
+  const Estimate& known = moments.by_phase_95[p];
+  return fmt::format("{} ({:.3g} to {:.3g} %)", share, 100 * known.lower, 100 * known.upper);
+}
+
 std::string path_text(const LastMoments& moments, const std::string& phase) {
   std::vector<std::string> names = moments.state_names;
   names.insert(names.end(), moments.noise_names.begin(), moments.noise_names.end());
-  std::string text = fmt::format("{} ({}):\n",
-                                 followed(moments) ? "Of the walks that failed, the one of least noise"
-                                                   : "The most likely last steps",
-                                 fmt::join(names, ", "));
+  std::string text =
+      fmt::format("{} ({}):\n",
+                  followed(moments) ? "Of the walks that failed, the one of least noise" : "The most likely last steps",
+                  fmt::join(names, ", "));
   for (const analysis::PathStep& step : moments.likeliest) {
     const std::string leg = moments.by_phase.size() > 1 ? fmt::format("{} {}: ", phase, step.phase) : "";
     const std::string met = step.noise.empty() ? "" : " meets " + numbers(step.noise);
@@ -114,10 +151,11 @@ std::string last_moments_sentence(const LastMoments& moments) {
 std::string last_moments_text(const LastMoments& moments, const std::string& phase, std::size_t width) {
   if (!moments.reason.empty()) return "How it fails is not told: " + moments.reason + ".\n";
   std::string text = to_text(last_moments_table(moments, "last-steps", "", {}), 1000, width);
+  if (!moments.regime.state_95.empty()) text += "\n" + to_text(medians_table(moments), 1000, width) + "\n";
   if (moments.by_phase.size() > 1) {
     std::string shares;
     for (std::size_t p = 0; p < moments.by_phase.size(); ++p)
-      shares += fmt::format("{}{} {} {:.3g} %", p == 0 ? "" : ", ", phase, p, 100 * moments.by_phase[p]);
+      shares += fmt::format("{}{} {} {}", p == 0 ? "" : ", ", phase, p, phase_share(moments, p));
     text += wrapped("The step that fails begins with " + shares + ".", "  ", width);
   }
   return text + path_text(moments, phase);
@@ -132,11 +170,15 @@ std::string last_moments_json(const LastMoments& moments) {
   }
   for (const analysis::PathStep& step : moments.likeliest)
     path.push_back({{"phase", step.phase}, {"state", step.state}, {"noise", step.noise}});
-  return Json{{"last_steps", last},
-              {"regime", profile_json(moments, moments.regime)},
-              {"by_phase", moments.by_phase},
-              {"most_likely_path", path}}
-      .dump();
+  Json json{{"last_steps", last},
+            {"regime", profile_json(moments, moments.regime)},
+            {"by_phase", moments.by_phase},
+            {"most_likely_path", path}};
+  if (!moments.by_phase_95.empty()) {
+    json["by_phase_intervals_95"] = Json::array();
+    for (const Estimate& share : moments.by_phase_95) json["by_phase_intervals_95"].push_back(ends_json(share));
+  }
+  return json.dump();
 }
 
 std::vector<Figure> last_moments_figures(const LastMoments& moments, const std::string& id, const std::string& where,

@@ -85,6 +85,7 @@ WalkerJson orbit_json(const std::vector<std::string>& names, const markov::MeshS
             {"state", nullptr},
             {"eigenvalues", WalkerJson::array()},
             {"period", 0},
+            {"longer_period", study.longer_period > 0 ? WalkerJson(study.longer_period) : WalkerJson(nullptr)},
             {"fails_without_noise_after",
              study.fails_without_noise > 0 ? WalkerJson(study.fails_without_noise) : WalkerJson(nullptr)}};
   WalkerJson json = {{"names", names},
@@ -167,6 +168,9 @@ void add_orbit_lines(Lines& lines, const std::vector<std::string>& names, const 
     lines.emplace_back("gait",
                        study.fails_without_noise > 0
                            ? fmt::format("none: without noise it fails after {} steps", study.fails_without_noise)
+                       : study.longer_period > 0
+                           ? fmt::format("none of up to {} revolutions: without noise it comes back after {}",
+                                         markov::longest_period, study.longer_period)
                            : std::string("none: without noise it comes to no orbit"));
     return;
   }

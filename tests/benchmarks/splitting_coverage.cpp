@@ -1,6 +1,7 @@
 // Counts how often the intervals of splitting hold the known answer, and how many steps of the map they take beside
 // direct simulation with the same interval.
-//   splitting_coverage [seeds] [first setting] [settings] [first seed]
+//   splitting_coverage [seeds] [first setting] [settings] [first seed] [mesh]
+// With the last word ensembles are split by a mesh's level, else by one that is learnt.
 
 #include <fmt/format.h>
 
@@ -100,6 +101,7 @@ std::vector<Tried> settings() {
 int main(int argc, char** argv) {
   const std::vector<Tried> all = settings();
   const auto [seeds, first_seed, first, last] = asked(argc, argv, 10, all.size());
+  const bool by_mesh = argc > 5 && std::string(argv[5]) == "mesh";
   for (std::size_t i = first; i < last; ++i) {
     const Tried& tried = all[i];
     int held = 0, refused = 0;
@@ -107,8 +109,8 @@ int main(int argc, char** argv) {
     const std::clock_t begin = std::clock();
     for (int seed = first_seed; seed < first_seed + seeds; ++seed) {
       try {
-        const markov::SplittingStudy study =
-            markov::splitting_study(tried.map, tried.start, {.seed = static_cast<std::uint64_t>(seed), .threads = 1});
+        const markov::SplittingStudy study = markov::splitting_study(
+            tried.map, tried.start, {.level_of_mesh = by_mesh, .seed = static_cast<std::uint64_t>(seed), .threads = 1});
         const double deviation = std::log(study.steps.value / tried.steps),
                      half = 0.5 * std::log(study.steps.upper / study.steps.lower);
         held += study.disagreement.empty() &&

@@ -240,7 +240,8 @@ def study(setting, *, method=None, cells=None, samples=None, tolerance=None, seq
     guided_samples   of the importance sampling beside it, asked above 100 steps; None: 4000, 0: none. It takes some
                      hundred rows of a Walker's step for each
     memory_gb        most memory of the meshes; None: 3
-    level            of a Walker or a Machine, what splitting splits by: level(state) -> n numbers that rise towards
+    level            what splitting splits by: "learnt", the chance of failing as it learns it; "mesh", that of a mesh,
+                     in up to four dimensions; or, of a Walker or a Machine, level(state) -> n numbers that rise towards
                      failure, of an (n, dimension) array of states (with phases > 1 level(state, phase)); angles are
                      within pi of the start's; None: learnt
 
@@ -257,12 +258,16 @@ def study(setting, *, method=None, cells=None, samples=None, tolerance=None, seq
                    direct=direct, certify=certify, sensitivities=sensitivities, standard_errors=standard_errors,
                    spacing=spacing, simulated_steps=simulated_steps, guided_samples=guided_samples,
                    memory_gb=memory_gb, how_it_fails=how_it_fails, seed=seed, threads=threads, time_limit=time_limit)
-    if level is not None and not callable(level):
-        raise TypeError(f"level: a function expected, not {type(level).__name__}")
-    if level is not None and not isinstance(setting, (Walker, Machine)):
+    if level is not None and not callable(level) and not isinstance(level, str):
+        raise TypeError(f'level: "learnt", "mesh" or a function expected, not {type(level).__name__}')
+    if level is not None and not isinstance(setting, (Walker, Machine, WalkerSetting) if isinstance(level, str)
+                                            else (Walker, Machine)):
         raise InputError("level: has no meaning under this setting")
-    command = _called("study", setting, level=level and getattr(level, "__name__", "level"),
+    called = level if level is None or isinstance(level, str) else getattr(level, "__name__", "level")
+    command = _called("study", setting, level=called,
                       **{key: value for key, value in options.items() if key not in ("threads", "time_limit")})
+    if isinstance(level, str):
+        options["level"], level = level, None
     if isinstance(setting, Machine):
         setting = setting.walker()
     with _progress.telling(progress, "study") as tell:

@@ -126,7 +126,8 @@ def _steps(value, interval):
 class HowItFails(Record):
     """The last steps before failure: `last_steps` with medians and middle 90 % of states and noise, and `bound_to_fail`,
     the chance of failing before being back in the middle of the metastable regime (None by splitting); `regime`, all
-    steps beside them; `most_likely_path`, by splitting the walk of least noise among those that failed."""
+    steps beside them; `most_likely_path`, by splitting the walk of least noise among those that failed. By splitting a
+    median has `median_interval_95`, and the ends of `middle_90` have `middle_90_intervals_95`, None where not known."""
 
     def _rows(self):
         rows = []
@@ -136,6 +137,9 @@ class HowItFails(Record):
                 for name in part.keys():
                     low, high = part[name].middle_90
                     row.update({name: part[name].median, f"{name}, 5 %": low, f"{name}, 95 %": high})
+                    if "median_interval_95" in part[name].keys():
+                        low, high = part[name].median_interval_95 or (numpy.nan, numpy.nan)
+                        row.update({f"{name}, median low95": low, f"{name}, median high95": high})
             rows.append({**row, "bound_to_fail": step.bound_to_fail})
         return rows
 
@@ -278,12 +282,18 @@ class WalkerStudy(Result):
 
     # Where there is a gait to tell of; where it was asked for; where splitting stands beside a mesh, or no mesh beside it.
     gait = how_it_fails = splitting = no_mesh = None
+    # By splitting: the intervals of `survival`, NaN where they are not known, and survival after steps beyond.
+    survival_interval_95 = survival_after = None
 
     def _headline(self):
         return f"{_steps(self.expected_steps.value, self.expected_steps.interval_95)}, {self.status}"
 
     def _rows(self):
-        return {"steps": numpy.arange(len(self.survival)), "survival": self.survival}
+        rows = {"steps": numpy.arange(len(self.survival)), "survival": self.survival}
+        if self.survival_interval_95 is not None:
+            low, high = self.survival_interval_95.T
+            rows.update(survival_low95=low, survival_high95=high)
+        return rows
 
     def _draw(self, ax):
         # Walks that all fail at once have no rate (`status` "all_failed").

@@ -238,6 +238,9 @@ TEST(PeriodicGait, FindsThePeriodsOfLogisticMaps) {
   }
   // The map with r = 4 leaves the unit interval from right above 1, and the finite numbers after that.
   EXPECT_FALSE(periodic_gait(logistic(4), std::vector<double>{1}));
+  // 32 revolutions from 3.56876 on, 64 from 3.56969 on, none at 3.6 (Feigenbaum's sequence); 4 at 3.5 is not longer.
+  for (const auto& [r, period] : {std::pair(3.569, 32), std::pair(3.5697, 64), std::pair(3.6, 0), std::pair(3.5, 0)})
+    EXPECT_EQ(longer_period(logistic(r), std::vector<double>{1 - 1 / r}), period) << r;
 }
 
 TEST(MeshStudy, SaysWhereTheWaysDisagree) {

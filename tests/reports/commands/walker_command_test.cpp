@@ -43,13 +43,24 @@ TEST_F(WalkerCommand, StepsSaysWhatStandsBehindThem) {
 }
 
 TEST_F(WalkerCommand, SplittingAgreesWithTheMesh) {
-  const Ran alone = metastable(
-      walker("steps", {"--method", "splitting", "--tolerance", "0.25", "--threads", "1", "--json", path("s.json")}));
+  const Ran alone = metastable(walker("steps", {"--method", "splitting", "--tolerance", "0.25", "--threads", "1",
+                                                "--how-it-fails", "--json", path("s.json")}));
   ASSERT_EQ(alone.code, 0) << alone.err;
   for (const char* said : {"by splitting: the rounds agree", "independent lines to failure", "steps of the map"})
     EXPECT_NE(alone.out.find(said), std::string::npos) << said << '\n' << alone.out;
   const auto json = nlohmann::json::parse(read(path("s.json")));
   EXPECT_EQ(json["status"], "rounds_agree");
+  const auto first = json["survival_interval_95"][1], after = json["survival_after"][1];
+  EXPECT_LT(first[0].get<double>(), json["survival"][1].get<double>());
+  EXPECT_GT(first[1].get<double>(), json["survival"][1].get<double>());
+  EXPECT_NEAR(after["steps"].get<double>(), json["expected_steps"]["value"].get<double>(), 0.6);
+  EXPECT_LT(after["interval_95"][0].get<double>(), after["share"].get<double>());
+  EXPECT_NE(alone.out.find("still walking after 1 step "), std::string::npos) << alone.out;
+  const auto last = json["how_it_fails"]["last_steps"][0]["noise"]["slope [deg]"];
+  EXPECT_LE(last["median_interval_95"][0].get<double>(), last["median"].get<double>());
+  EXPECT_LE(last["middle_90_intervals_95"][0][0].get<double>(), last["middle_90"][0].get<double>());
+  EXPECT_NE(alone.out.find("The medians, with 95 % intervals from the rounds"), std::string::npos) << alone.out;
+  EXPECT_EQ(json["split_by"], "nothing");  // failures are frequent
   const Ran both = metastable(walker("steps", {"--method", "auto", "--spacing", "0.9", "--simulated-steps", "50000",
                                                "--tolerance", "0.25", "--json", path("b.json")}));
   ASSERT_EQ(both.code, 0) << both.err;

@@ -151,6 +151,14 @@ class Steps(unittest.TestCase):
             self.assertLess(abs(np.log(study.expected_steps.value / 1140.3)), np.log(high / low))
             self.assertEqual(study.status, "rounds_agree")
             self.assertEqual(study.survival[0], 1)
+            low, high = study.survival_interval_95.T
+            self.assertTrue((np.isnan(low) | (low <= study.survival) & (study.survival <= high)).all())
+            self.assertTrue(0 < low[-1] < high[-1] < 1)
+            after = study.survival_after[1]
+            self.assertEqual(after.steps, 1000)
+            self.assertTrue(after.interval_95[0] < after.share < after.interval_95[1])
+            low, high = last.state["x6"].median_interval_95
+            self.assertTrue(low <= last.state["x6"].median <= high)
         self.assertIn("meshes hold 1 to 4", study.no_mesh)
         with self.assertRaisesRegex(metastable.InputError, "spacing: has no meaning under method splitting"):
             walker.study(method="splitting", spacing=1)
@@ -165,17 +173,27 @@ class Steps(unittest.TestCase):
         own = walker.study(method="splitting", tolerance=0.2, level=lambda state: state[:, 0]).expected_steps
         low, high = own.interval_95
         self.assertLess(abs(np.log(own.value / learnt.value)), 2 * np.log(high / low))
+        by_mesh = walker.study(method="splitting", tolerance=0.2, level="mesh")
+        self.assertEqual(by_mesh.split_by, "mesh")
+        self.assertLess(abs(np.log(by_mesh.expected_steps.value / learnt.value)), 2 * np.log(high / low))
+        self.assertIn("of a mesh of", str(by_mesh))
+        self.assertEqual(walker.study(method="auto", tolerance=0.2, simulated_steps=0).splitting.split_by, "learnt")
         for level, kind, sentence in (
                 (lambda state: state, ValueError, r"level: \d+ numbers, one for each state, expected, and shape"),
                 (lambda state: "far", TypeError, "level: numbers are to be returned, not str"),
                 (lambda state: np.where(state[:, 0] > 0, np.nan, 0), metastable.MapError, "level function: it is nan"),
-                (3, TypeError, "level: a function expected, not int")):
+                ("far", metastable.InputError, "level: 'far' is none of learnt, mesh"),
+                (3, TypeError, 'level: "learnt", "mesh" or a function expected, not int')):
             with self.subTest(sentence), self.assertRaisesRegex(kind, sentence):
                 walker.study(method="splitting", tolerance=0.2, level=level)
         with self.assertRaisesRegex(metastable.InputError, 'level: has no meaning with method "mesh"'):
             walker.study(level=lambda state: state[:, 0])
         with self.assertRaisesRegex(metastable.InputError, "level: has no meaning under this setting"):
             metastable.study(metastable.WalkerSetting("simplest", slope_sd_deg=0.05), level=abs)
+        with self.assertRaisesRegex(metastable.InputError, "level: has no meaning under this setting"):
+            metastable.study(metastable.Setting(), level="mesh")
+        with self.assertRaisesRegex(metastable.InputError, "level: has a meaning under method splitting and auto only"):
+            walker.study(level="mesh")
 
     def test_a_mesh_stands_alone_where_splitting_has_no_number(self):
         def two_gaits(state, noise):
