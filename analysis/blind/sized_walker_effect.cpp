@@ -68,6 +68,7 @@ const std::map<std::string, WalkerEntry>& walker_entries() {
   using D = WalkerDraw;
   const std::vector<std::string> anywhere{"speed", "collision", "phase", "leg", ":mean"};
   const std::vector<std::string> noisy{":spread", ":memory", ":tail"};
+  const std::vector<std::string> first{"step", "collision", ":mean", ":spread"};
   static const std::map<std::string, WalkerEntry> entries{
       {"hip_damping", {[](const D& d) { return one_way(d, 0.005, 2); }, anywhere}},
       {"hip_dry_friction", {[](const D& d) { return one_way(d, 0.005, 2); }, anywhere}},
@@ -93,6 +94,12 @@ const std::map<std::string, WalkerEntry>& walker_entries() {
       {"sensor_bias_half_angle_rad", {[](const D& d) { return two_ways(d, 5e-5, 0.01); }, anywhere}},
       {"sensor_bias_stance_rate_rad_s", {[](const D& d) { return two_ways(d, 5e-4, 0.1); }, anywhere}},
       {"sensor_bias_swing_rate_rad_s", {[](const D& d) { return two_ways(d, 5e-4, 0.1); }, anywhere}},
+      {"launch_half_angle_rad", {[](const D& d) { return two_ways(d, 2e-3, 0.05); }, first}},
+      {"launch_stance_rate_rad_s", {[](const D& d) { return two_ways(d, 5e-3, 0.2); }, first}},
+      {"launch_swing_rate_rad_s", {[](const D& d) { return two_ways(d, 2e-3, 0.2); }, first}},
+      {"launch_spread_half_angle_rad", {[](const D& d) { return one_way(d, 1e-3, 0.05); }, first}},
+      {"launch_spread_stance_rate_rad_s", {[](const D& d) { return one_way(d, 5e-3, 0.2); }, first}},
+      {"launch_spread_swing_rate_rad_s", {[](const D& d) { return one_way(d, 2e-3, 0.2); }, first}},
   };
   return entries;
 }

@@ -12,6 +12,7 @@
 #include <tuple>
 #include <utility>
 
+#include "analysis/diagnosis/at_bound.h"
 #include "analysis/diagnosis/at_work.h"
 #include "analysis/diagnosis/beside_unnamed.h"
 #include "analysis/diagnosis/detectability.h"
@@ -30,6 +31,7 @@
 #include "analysis/gap/fitted_variations.h"
 #include "analysis/gap/gap_map.h"
 #include "analysis/gap/gap_shrinkage.h"
+#include "analysis/gap/trial_groups.h"
 #include "analysis/statistics/interval_95.h"
 
 namespace metastable::analysis {
@@ -411,6 +413,9 @@ Decided decide(const TransitionModel& model, const Fitted& fitted, const std::ve
   decided.ranked = hypotheses(model, fitted.ranking);
   Chosen chosen = best_hypothesis(model, fitted, decided.ranked, std::move(found), tested.gap, options);
   decided.cause = chosen.fit;
+  if (const std::optional<TrialGroups> two =
+          trial_groups(model, fitted.ranking.scan, fitted.recalibrated, *chosen.fit, options.seed))
+    d.data.notes.push_back(trial_groups_in_words(model, *two));
   d.gap.left = chosen.left;
   progress(0.7, "how far it shrinks");
   decided.held_out = hold_out(model, fitted, decided.ranked, d.data, chosen, options, progress);
@@ -471,7 +476,9 @@ Diagnosis answer(const TransitionModel& model, const Fitted& fitted, const std::
   if (d.causes.set.size() > 1 && best)
     d.limits.next = next_experiments(model, best->fit, rivals(ordered, d), d.rules, options.threads, options.seed);
   progress(1, "done");
+  d.limits.at_bound = values_at_bound(model, cause);
   d.sentences = sentences(d);
+  for (const AtBound& one : d.limits.at_bound) d.sentences.push_back(at_bound_in_words(one));
   return std::move(d);
 }
 

@@ -69,6 +69,14 @@ struct Cause {
   std::string name() const;  ///< "a", "a+b" or "a+b+c"
 };
 
+/// A fitted value that stands at an end of its range.
+struct AtBound {
+  std::string of;         ///< the effect's id; empty: a parameter that a recalibration refits
+  std::string parameter;  ///< as it is reported
+  bool upper = false;     ///< the upper end, else the lower
+  double value = 0;
+};
+
 /// One effect, or several that these data cannot tell apart, whatever else is at work.
 struct AtWork {
   std::string name;                  ///< the effect's id, or what the group has in common
@@ -196,6 +204,7 @@ struct Diagnosis {
     std::vector<MissingColumn> missing;
     std::vector<NotPossible> not_possible;
     std::vector<NextExperiment> next;
+    std::vector<AtBound> at_bound;  ///< of the likeliest hypothesis; of the recalibrated model where that is chosen
   } limits;
 
   /// Says what was diagnosed.

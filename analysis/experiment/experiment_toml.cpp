@@ -111,6 +111,24 @@ class Keys {
     return Spread{*mean, *sd};
   }
 
+  // Reads a list of texts.
+  std::vector<std::string> texts(std::string_view key) {
+    const toml::node* node = find(key, false);
+    std::vector<std::string> all;
+    if (node == nullptr) return all;
+    const toml::array* list = node->as_array();
+    for (std::size_t i = 0; list != nullptr && i < list->size(); ++i)
+      if (const auto* one = list->get(i)->as_string()) all.push_back(one->get());
+    if (list == nullptr || all.size() != list->size())
+      report(*node, fmt::format("{}: a list of texts in quotes is expected", path(key)));
+    return all;
+  }
+  std::vector<std::string> keys() const {
+    std::vector<std::string> all;
+    for (const auto& [key, node] : table_) all.emplace_back(key.str());
+    return all;
+  }
+
   void finish() {
     for (const auto& [key, node] : table_) {
       if (known_.contains(key.str())) continue;
@@ -268,6 +286,31 @@ std::optional<toml::table> parse(const std::string& file, std::string_view text,
   return std::nullopt;
 }
 
+// Reads what is said of a measured column, if it is there.
+void read_machine_column(Keys& columns, const std::string& state, std::vector<WalkDescription::Column>& all) {
+  std::optional<Keys> column = columns.table(state, false);
+  if (!column) return;
+  all.push_back({state, column->number("sd", false, {.low = 0, .high = 1000}),
+                 column->number("correlation", false, {.low = -0.5, .high = 0.5}).value_or(0)});
+  column->finish();
+}
+
+// Reads the launches that are stated, { mean = , sd = } by state.
+void read_walk_launches(Keys& keys, const std::vector<std::string>& states, WalkDescription& walks) {
+  constexpr Range any{.low = -30, .high = 30};
+  for (const std::string& state : states) {
+    const toml::node* node = keys.find(state, false);
+    if (node == nullptr) continue;
+    const std::optional<Spread> launch = keys.spread(state, true, any);
+    if (!launch) continue;
+    if (launch->sd < 0)
+      keys.report(*node, fmt::format("launch.{}.sd: {} is outside [0, 30]", state, launch->sd));
+    else
+      walks.launches.emplace_back(state, *launch);
+  }
+  keys.finish();
+}
+
 }  // namespace
 
 void parse_experiment_toml(const std::string& file, std::string_view text, Experiment& experiment, Defects& defects) {
@@ -321,25 +364,52 @@ std::optional<WalkDescription> parse_walk_toml(const std::string& file, std::str
         known->report(*machine->find("parameters", true), "machine.parameters: a mean of 0 is outside (0, 45)");
       known->finish();
     }
+    walks.labels = machine->texts("labels");
     machine->finish();
   } else {
     walks.no_walker = defects.lines().back();
   }
+  std::vector<std::string> states{"half_angle_rad", "stance_rate_rad_s"};
+  if (walks.walker == "compass") states.emplace_back("swing_rate_rad_s");
   if (std::optional<Keys> columns = root.table("columns", true)) {
-    std::vector<std::string> states{"half_angle_rad", "stance_rate_rad_s"};
-    if (walks.walker == "compass") states.emplace_back("swing_rate_rad_s");
-    for (const std::string& state : states)
-      if (std::optional<Keys> column = columns->table(state, false)) {
-        walks.columns.push_back({state, column->number("sd", false, {.low = 0, .high = 1000}),
-                                 column->number("correlation", false, {.low = -0.5, .high = 0.5}).value_or(0)});
-        column->finish();
-      }
+    for (const std::string& state : states) read_machine_column(*columns, state, walks.columns);
     columns->finish();
     if (walks.columns.empty())
       root.report(*root.find("columns", true), "columns: none is stated, nothing was measured");
   }
+  if (std::optional<Keys> launch = root.table("launch", false)) read_walk_launches(*launch, states, walks);
   root.finish();
   return walks;
+}
+
+std::optional<MachineDescription> parse_machine_toml(const std::string& file, std::string_view text, Defects& defects) {
+  const std::optional<toml::table> table = parse(file, text, defects);
+  if (!table) return std::nullopt;
+  Keys root(file, *table, "", defects);
+  MachineDescription told;
+  if (root.text("system", true).value_or("machine") != "machine") {
+    root.report(*root.find("system", true), "system: \"machine\" is expected: this is another system's folder");
+    return std::nullopt;
+  }
+  told.title = root.text("title", false).value_or("");
+  if (std::optional<Keys> machine = root.table("machine", true)) {
+    if (machine->text("model", true).value_or("none") != "none") {
+      machine->report(*machine->find("model", true),
+                      "machine.model: \"none\" is expected; a folder of a built-in walker is diagnosed as it is");
+      return std::nullopt;
+    }
+    told.labels = machine->texts("labels");
+    told.inputs = machine->texts("inputs");
+    if (std::optional<Keys> known = machine->table("parameters", false))
+      for (const std::string& name : known->keys())
+        if (const std::optional<Spread> one = known->spread(name, true, {.low = -1e300, .high = 1e300}))
+          told.parameters.emplace_back(name, *one);
+    machine->finish();
+  }
+  if (std::optional<Keys> columns = root.table("columns", false))
+    for (const std::string& name : columns->keys()) read_machine_column(*columns, name, told.columns);
+  root.finish();
+  return told;
 }
 
 }  // namespace metastable::analysis

@@ -109,6 +109,17 @@ struct Rules {
   /// would pass for its cause.
   static constexpr std::size_t least_trials_to_explain = 4, least_transitions_to_explain = 40;
 
+  // Trials of two machines in one folder. The benchmark does not turn these.
+
+  /// Level at which two groups of trials are said to be there, half for groups in any order and half for one after the
+  /// other. Convention: one folder in a hundred, where trials differ as the heights of a sine do or, in order, as
+  /// normals about a smooth drift.
+  static constexpr double two_machines_level = 0.01;
+  /// Share of the trials' scatter under the likeliest hypothesis that two groups may leave. Convention: two thirds.
+  /// What accounts for the groups as they do leaves as much; a drift that takes up a step of four sds leaves twice as
+  /// much.
+  static constexpr double most_left_by_groups = 0.67;
+
   /// Says whether hypotheses are fitted and weighed alike under other rules.
   bool fits_as(const Rules& other) const {
     return expected_gain == other.expected_gain && model_error == other.model_error && pair_prior == other.pair_prior &&

@@ -174,6 +174,8 @@ class TransitionModel {
   /// computed from the event's own speed alone.
   virtual bool time_tells() const = 0;
   virtual std::string condition_name(std::size_t condition) const = 0;
+  /// Names a trial as its user does. The default is its number in the order they were run, from 1.
+  virtual std::string trial_name(std::size_t trial) const { return std::to_string(trial + 1); }
   /// Names one of the steps that a speed is observed of, in the singular.
   virtual std::string step_name() const { return "step"; }
   /// Names what is observed of a step; Event::column is its index.

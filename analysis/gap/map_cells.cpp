@@ -35,10 +35,15 @@ class Cutter {
     const auto& events = model_.events();
     two_phases_ = std::any_of(events.begin(), events.end(), [](const Event& e) { return is_stance(e.kind); });
     for (const EventPhase& phase : event_phases(model_)) cut_phase(phase);
-    std::vector<std::size_t> launches;
-    for (std::size_t i = 0; i < events.size(); ++i)
-      if (events[i].kind == EventKind::launch) launches.push_back(i);
-    if (launches.size() >= least_launches) cells_.push_back({"collision", "launch", launches, false});
+    const std::vector<ObservedColumn> columns = model_.columns();
+    for (std::size_t c = 0; c < columns.size(); ++c) {
+      std::vector<std::size_t> launches;
+      for (std::size_t i = 0; i < events.size(); ++i)
+        if (events[i].kind == EventKind::launch && events[i].column == c) launches.push_back(i);
+      if (launches.size() >= least_launches)
+        cells_.push_back(
+            {model_.step_name(), "launch" + (columns.size() > 1 ? ", " + columns[c].name : ""), launches, false});
+    }
     return std::move(cells_);
   }
 

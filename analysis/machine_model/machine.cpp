@@ -84,6 +84,11 @@ std::size_t Machine::state_index(const std::string& state) const {
   return static_cast<std::size_t>(at - states.begin());
 }
 
+const MachineLaunch* Machine::stated_launch(const std::string& state) const {
+  const auto found = std::ranges::find(launches, state, &MachineLaunch::state);
+  return found == launches.end() || found->assumed ? nullptr : &*found;
+}
+
 void Machine::require_valid() const {
   if (!step) throw std::invalid_argument("step: there is none");
   if (states.empty() || states.size() > most_states)

@@ -50,11 +50,12 @@ struct MachineSensor {
   }
 };
 
-/// The distribution from which the first value of a state comes, where a trial's first row does not have it.
+/// The distribution from which the first value of a state comes. A first row that has the value is held against it,
+/// unless it is assumed: then it only fills in what a first row lacks.
 struct MachineLaunch {
   std::string state;
   double mean = 0, sd = 0;
-  bool assumed = false;  ///< nobody stated the sd: walks that are drawn start at the mean
+  bool assumed = false;  ///< nobody stated it: walks that are drawn start at the mean
 };
 
 /// One call of a step map: `rows` states at once. A value (see Machine::value_names()) is one number for all rows, or
@@ -82,7 +83,7 @@ struct Machine {
   std::vector<MachineEffect> effects;
   std::vector<std::string> may_vary;    ///< parameters that may differ by phase, run, clock, place, state or label
   std::vector<MachineSensor> observe;   ///< at least one
-  std::vector<MachineLaunch> launches;  ///< of states that a first row may lack
+  std::vector<MachineLaunch> launches;  ///< at least of states that a first row may lack
   std::vector<std::string> inputs;      ///< recorded numbers that a step is given, by their columns' names
   /// A call of `step` costs much more than a row, as where an interpreter runs it.
   bool dear = false;
@@ -92,6 +93,8 @@ struct Machine {
   std::vector<std::string> value_names() const;
   /// Returns the index of a state. @throws std::invalid_argument for an unknown one, with those there are
   std::size_t state_index(const std::string& state) const;
+  /// Returns the launch that somebody stated of a state; nullptr where there is none, or where it is assumed.
+  const MachineLaunch* stated_launch(const std::string& state) const;
   /// @throws std::invalid_argument naming the first thing that is wrong, and the range
   void require_valid() const;
 };

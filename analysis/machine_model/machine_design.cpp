@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <numeric>
 
 #include "analysis/statistics/median.h"
 
@@ -26,6 +27,22 @@ void measure_columns(MachineDesign& design, const Machine& machine, const Machin
     const double drift = first / std::max(1.0, pairs);
     design.change.push_back(std::sqrt(std::max(0.0, second / std::max(1.0, pairs) - drift * drift)));
   }
+}
+
+// Measures the first values of trials that take a step.
+FirstValues first_values(const MachineRuns& runs, std::size_t sensor) {
+  std::vector<double> values;
+  for (const MachineTrial& trial : runs.trials)
+    if (steps_of(trial) > 0 && !std::isnan(trial.rows.front().seen[sensor]))
+      values.push_back(trial.rows.front().seen[sensor]);
+  FirstValues first{values.size(), 0, 0};
+  if (values.empty()) return first;
+  const auto count = static_cast<double>(values.size());
+  first.mean = std::accumulate(values.begin(), values.end(), 0.0) / count;
+  double squares = 0;
+  for (const double x : values) squares += (x - first.mean) * (x - first.mean);
+  first.sd = std::sqrt(squares / count);
+  return first;
 }
 
 void measure_place(MachineDesign& design, const MachineRuns& runs) {
@@ -56,6 +73,7 @@ MachineDesign machine_design(const Machine& machine, const MachineRuns& runs) {
   design.phases = runs.phases;
   design.labels = runs.labels;
   measure_columns(design, machine, runs);
+  for (std::size_t j = 0; j < machine.observe.size(); ++j) design.first.push_back(first_values(runs, j));
   measure_place(design, runs);
   const double last = runs.trials.size() > 1 ? static_cast<double>(runs.trials.size() - 1) : 1;
   for (std::size_t t = 0; t < runs.trials.size(); ++t)

@@ -23,6 +23,12 @@ struct StepPlace {
   std::vector<double> seen;  ///< [sensors] before the step, in sds of its column from the mean; 0 where it is missing
 };
 
+/// The values that a sensor has in the first rows of trials.
+struct FirstValues {
+  std::size_t count = 0;
+  double mean = 0, sd = 0;
+};
+
 /// All steps of the runs, in the order in which MachineHypothesis numbers them, and what they cover.
 struct MachineDesign {
   std::vector<StepPlace> steps;
@@ -34,6 +40,7 @@ struct MachineDesign {
   double first_position = 0, last_position = 0;         ///< [m]
   std::vector<double> mean, sd;                         ///< by sensor, of its column
   std::vector<double> change;                           ///< by sensor: sd of its change from row to row
+  std::vector<FirstValues> first;                       ///< by sensor
 };
 
 MachineDesign machine_design(const Machine& machine, const MachineRuns& runs);

@@ -23,6 +23,8 @@ constexpr double largest_memory = 0.9;
 // Zeros of sensors are known to a share of what a column spans, or to some of its errors.
 constexpr double usual_bias = 0.1, bias_errors = 3;
 constexpr double largest_share = 0.2;  // of outliers
+constexpr double widest_launch = 10;   // launches are off by so many of their stated sds at most, at least
+constexpr double launch_errors = 4;    // standard errors from which on first rows suggest a size by themselves
 
 // Returns how far a parameter may vary to either side.
 double range_of(const MachineParameter& p) {
@@ -278,6 +280,85 @@ MachineCandidate sensor_bias(const Machine& machine, const MachineDesign& design
   return one;
 }
 
+// What the launch of a state is held against.
+struct LaunchSeen {
+  const MachineLaunch* stated;  // nullptr: nobody stated it
+  bool measured;
+  FirstValues first;
+  double usual, most;  // sd that the first values have as stated; by how much they may be off
+};
+
+LaunchSeen launch_seen(const Machine& machine, const MachineDesign& design, std::size_t state) {
+  const std::string& name = machine.states[state];
+  const auto sensor = std::ranges::find(machine.observe, name, &MachineSensor::state);
+  LaunchSeen seen{machine.stated_launch(name), sensor != machine.observe.end(), {}, 0, 0};
+  if (seen.measured) {
+    const auto j = static_cast<std::size_t>(sensor - machine.observe.begin());
+    seen.first = design.first[j];
+    seen.usual = sensor->sd.value_or(0);
+    seen.most = 2 * design.sd[j];
+  }
+  if (seen.stated) {
+    seen.usual = std::hypot(seen.usual, seen.stated->sd);
+    seen.most = std::max({seen.most, std::abs(seen.stated->mean), widest_launch * seen.stated->sd});
+  }
+  if (!(seen.most > 0)) seen.most = 1;
+  return seen;
+}
+
+MachineCandidate launch_effect(const std::string& id, const LaunchSeen& seen) {
+  MachineCandidate one;
+  one.candidate.id = id;
+  one.candidate.exact = true;
+  if (!seen.stated)
+    one.candidate.undecidable = "no launch is stated of it";
+  else if (seen.measured && seen.first.count < fewest_trials)
+    one.candidate.undecidable = fmt::format("it takes {} trials whose first row has it", fewest_trials);
+  return one;
+}
+
+// Trials begin elsewhere than it is stated. First rows that are far off suggest a size by themselves.
+MachineCandidate launch_offset(const Machine& machine, const MachineDesign& design, std::size_t state) {
+  const LaunchSeen seen = launch_seen(machine, design, state);
+  MachineCandidate one = launch_effect("launch_" + machine.states[state], seen);
+  FreeParameter offset{0, -seen.most, seen.most, fine_step * seen.most};
+  if (seen.stated && seen.first.count > 0) {
+    const double off = seen.first.mean - seen.stated->mean, count = static_cast<double>(seen.first.count);
+    if (std::abs(off) > launch_errors * seen.usual / std::sqrt(count))
+      offset.likely = std::clamp(off, offset.lower, offset.upper);
+  }
+  one.candidate.parameters = {offset};
+  one.candidate.report = reporting({}, {"offset"});
+  one.apply = [state, states = machine.states.size()](MachineHypothesis& h, const Values&, const Values& v) {
+    h.launch_offset.resize(states);
+    h.launch_offset[state] = v[0];
+  };
+  return one;
+}
+
+// Trials begin at places that scatter more than it is stated.
+MachineCandidate launch_spread(const Machine& machine, const MachineDesign& design, std::size_t state) {
+  const LaunchSeen seen = launch_seen(machine, design, state);
+  MachineCandidate one = launch_effect("launch_spread_" + machine.states[state], seen);
+  const double most = seen.most * seen.most, usual = seen.usual > 0 ? seen.usual * seen.usual : 1e-4 * most;
+  FreeParameter variance{0, 0, std::max(most, usual), 1e-2 * usual, usual};
+  if (seen.stated && seen.first.count > 0) {
+    const double more = seen.first.sd * seen.first.sd - usual;
+    if (more > launch_errors * std::sqrt(2 / static_cast<double>(seen.first.count)) * usual)
+      variance.likely = std::min(more, variance.upper);
+  }
+  one.candidate.parameters = {variance};
+  one.candidate.report = [](const Values&, const Values& v) {
+    return std::vector<NamedValue>{{"sd_between_trials", std::sqrt(std::max(0.0, v[0]))}};
+  };
+  one.candidate.form_of = [](const Values& v) { return FittedForm{{}, {v[0] * v[0]}}; };
+  one.apply = [state, states = machine.states.size()](MachineHypothesis& h, const Values&, const Values& v) {
+    h.launch_scatter.resize(states);
+    h.launch_scatter[state] = std::sqrt(std::max(0.0, v[0]));
+  };
+  return one;
+}
+
 }  // namespace
 
 std::vector<MachineCandidate> machine_effects(const Machine& machine, std::shared_ptr<const MachineDesign> design) {
@@ -295,6 +376,13 @@ std::vector<MachineCandidate> machine_effects(const Machine& machine, std::share
   all.push_back(outliers());
   for (std::size_t j = 0; j < machine.observe.size(); ++j) all.push_back(sensor_noise(machine, *design, j));
   for (std::size_t j = 0; j < machine.observe.size(); ++j) all.push_back(sensor_bias(machine, *design, j));
+  for (std::size_t s = 0; s < machine.states.size(); ++s) {
+    if (!machine.stated_launch(machine.states[s]) &&
+        std::ranges::find(machine.observe, machine.states[s], &MachineSensor::state) == machine.observe.end())
+      continue;
+    all.push_back(launch_offset(machine, *design, s));
+    all.push_back(launch_spread(machine, *design, s));
+  }
   return all;
 }
 

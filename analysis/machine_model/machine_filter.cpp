@@ -35,6 +35,7 @@ class Follower {
       state_.push_back(static_cast<Eigen::Index>(machine.state_index(machine.observe[j].state)));
       shared_.push_back(machine.observe[j].correlation != 0 ? shared_count_++ : -1);
       scale_.push_back(column_spread(runs, j).sd);
+      stated_.push_back(machine.stated_launch(machine.observe[j].state));
     }
     bent_ = bent_numbers(machine, plan);
     std::size_t number = 0;
@@ -54,6 +55,7 @@ class Follower {
   // A row that says nothing may be a failure, too.
   double tolerated(double chance) const { return supposed_.wild + (1 - supposed_.wild) * chance; }
   Part launched(const MachineRow& row) const;
+  Part begun(const MachineRow& row);
   Look<Most> look(std::size_t sensor, Eigen::Index size) const;
   Part see(AfterStep<Most>& after, const MachineRow& row);
   void put(std::size_t event, const SeenValue& seen, double failed);
@@ -66,9 +68,10 @@ class Follower {
   std::vector<Eigen::Index> state_;  // by sensor
   std::vector<int> shared_;          // by sensor: which of those that share errors; -1: none
   int shared_count_ = 0;
-  int bent_ = 0;                    // numbers of the vector in which beliefs are bent
-  std::vector<double> scale_;       // by sensor: spread of its column
-  std::vector<std::size_t> first_;  // by trial: number of its first transition
+  int bent_ = 0;                              // numbers of the vector in which beliefs are bent
+  std::vector<double> scale_;                 // by sensor: spread of its column
+  std::vector<const MachineLaunch*> stated_;  // by sensor: the launch that is stated of its state; nullptr: none
+  std::vector<std::size_t> first_;            // by trial: number of its first transition
   Evaluation out_;
   std::vector<double>* chances_ = nullptr;
   std::vector<std::size_t> cursor_;  // by trial: its next event
@@ -85,7 +88,7 @@ double Follower<Most>::added_variance(std::size_t sensor) const {
   return variance;
 }
 
-// The belief at a trial's first row: what was seen of it, else the launch; nothing is known of a state before.
+// The belief at a row before which nothing is known: what was seen of it, else the launch.
 template <int Most>
 typename BeliefMixture<Most>::Part Follower<Most>::launched(const MachineRow& row) const {
   const auto size = static_cast<Eigen::Index>(stepper_.size());
@@ -94,8 +97,9 @@ typename BeliefMixture<Most>::Part Follower<Most>::launched(const MachineRow& ro
   const auto states = static_cast<Eigen::Index>(stepper_.states());
   for (const MachineLaunch& launch : machine_.launches) {
     const auto s = static_cast<Eigen::Index>(machine_.state_index(launch.state));
-    belief.mean[s] = launch.mean;
-    belief.covariance(s, s) = launch.sd * launch.sd;
+    const NormalLaunch at = supposed_launch(supposed_, launch, static_cast<std::size_t>(s));
+    belief.mean[s] = at.mean;
+    belief.covariance(s, s) = at.sd * at.sd;
   }
   for (std::size_t i = 0; i < supposed_.spreads.size(); ++i) {
     const auto at = states + static_cast<Eigen::Index>(i);
@@ -115,6 +119,40 @@ typename BeliefMixture<Most>::Part Follower<Most>::launched(const MachineRow& ro
     belief.covariance(s, s) += sd * sd * (own * own + kept * kept);
     belief.covariance(s, size + shared_[j]) = belief.covariance(size + shared_[j], s) = -sd * own;
   }
+  return belief;
+}
+
+// The belief at a trial's first row. A state whose launch is stated comes from there, and its value in the row is an
+// event: it is held against the launch and sharpens what is believed of the state.
+template <int Most>
+typename BeliefMixture<Most>::Part Follower<Most>::begun(const MachineRow& row) {
+  Part belief = launched(row);
+  const Eigen::Index kept = belief.mean.size(), size = kept + shared_count_;
+  std::vector<std::size_t> compared;
+  for (std::size_t j = 0; j < state_.size(); ++j)
+    if (stated_[j] && !std::isnan(row.seen[j])) compared.push_back(j);
+  if (compared.empty()) return belief;
+  belief.mean.conservativeResize(size);
+  belief.covariance.conservativeResize(size, size);
+  belief.mean.tail(shared_count_).setZero();
+  belief.covariance.rightCols(shared_count_).setZero();
+  belief.covariance.bottomRows(shared_count_).setZero();
+  for (Eigen::Index i = kept; i < size; ++i) belief.covariance(i, i) = 1;  // errors of the rows before
+  for (const std::size_t j : compared) {
+    const Eigen::Index s = state_[j];
+    const NormalLaunch at = supposed_launch(supposed_, *stated_[j], static_cast<std::size_t>(s));
+    belief.mean[s] = at.mean;
+    belief.covariance.row(s).setZero();
+    belief.covariance.col(s).setZero();
+    belief.covariance(s, s) = at.sd * at.sd;
+  }
+  BeliefMixture<Most> mixture;
+  mixture.parts().push_back(std::move(belief));
+  mixture.add_wild(supposed_.wild, wild_width);
+  for (const std::size_t j : compared) put(cursor_[trial_]++, mixture.see(look(j, size), row.seen[j], 0), 0);
+  belief = mixture.collapsed();
+  belief.mean.conservativeResize(kept);
+  belief.covariance.conservativeResize(kept, kept);
   return belief;
 }
 
@@ -184,8 +222,8 @@ Evaluation Follower<Most>::follow(const std::vector<Event>& events, std::vector<
   cursor_.assign(runs_.trials.size(), events.size());
   for (std::size_t e = events.size(); e-- > 0;) cursor_[events[e].trial] = e;
   std::vector<Part> beliefs;
-  for (const MachineTrial& trial : runs_.trials)
-    beliefs.push_back(trial.rows.empty() ? Part{} : launched(trial.rows.front()));
+  for (trial_ = 0; trial_ < runs_.trials.size(); ++trial_)
+    beliefs.push_back(steps_of(runs_.trials[trial_]) == 0 ? Part{} : begun(runs_.trials[trial_].rows.front()));
   BeliefStep<Most> stepping(stepper_, plan_, static_cast<std::size_t>(shared_count_), bent_ > 0);
   for (std::size_t k = 0; k < runs_.longest(); ++k) {
     std::vector<TransitionPlace> places;
@@ -217,6 +255,9 @@ std::vector<Event> machine_events(const Machine& machine, const MachineRuns& run
   std::vector<Event> all;
   for (std::size_t t = 0; t < runs.trials.size(); ++t) {
     const MachineTrial& trial = runs.trials[t];
+    for (std::size_t j = 0; j < machine.observe.size() && steps_of(trial) > 0; ++j)
+      if (machine.stated_launch(machine.observe[j].state) && !std::isnan(trial.rows.front().seen[j]))
+        all.push_back({.kind = EventKind::launch, .trial = t, .condition = trial.condition, .column = j});
     for (std::size_t k = 0; k < steps_of(trial); ++k) {
       const MachineRow& row = trial.rows[k];
       Event event;

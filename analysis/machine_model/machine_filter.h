@@ -12,7 +12,8 @@
 
 namespace metastable::analysis {
 
-/// Lists the events of the runs: the values of each row after the first, sensor by sensor, and failures and survivals.
+/// Lists the events of the runs: the values of each row after the first, sensor by sensor, and failures and survivals;
+/// those of the first row of a trial that takes a step where a launch is stated, as EventKind::launch.
 std::vector<Event> machine_events(const Machine& machine, const MachineRuns& runs, const ScorePlan& plan);
 
 /// Evaluates them. The state given what was measured is carried as one normal, jointly with what differs between

@@ -9,7 +9,8 @@ namespace {
 // Says whether a hypothesis has nothing but values, sensors and what adds to single transitions.
 bool only_adds(const MachineHypothesis& h, const MachineHypothesis& plain) {
   return h.values == plain.values && h.sensor_sd == plain.sensor_sd && h.wild == plain.wild && h.laws.empty() &&
-         h.spreads.empty() && h.memory.empty() && h.added_noise.empty() && h.bias.empty() && h.outliers == 0;
+         h.spreads.empty() && h.memory.empty() && h.added_noise.empty() && h.bias.empty() && h.launch_offset.empty() &&
+         h.launch_scatter.empty() && h.outliers == 0;
 }
 
 std::vector<double> per(double step, std::vector<double> transition) {
@@ -18,6 +19,13 @@ std::vector<double> per(double step, std::vector<double> transition) {
 }
 
 }  // namespace
+
+NormalLaunch supposed_launch(const MachineHypothesis& hypothesis, const MachineLaunch& launch, std::size_t state) {
+  NormalLaunch at{launch.mean, launch.sd};
+  if (!hypothesis.launch_offset.empty()) at.mean += hypothesis.launch_offset[state];
+  if (!hypothesis.launch_scatter.empty()) at.sd = std::hypot(at.sd, hypothesis.launch_scatter[state]);
+  return at;
+}
 
 void add(MachineHypothesis& hypothesis, std::size_t states, const Addition& added) {
   const std::size_t values = hypothesis.values.size();

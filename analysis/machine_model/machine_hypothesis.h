@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "analysis/fitting/transition_model.h"
+#include "analysis/machine_model/machine.h"
 
 namespace metastable::analysis {
 
@@ -39,14 +40,23 @@ struct MachineHypothesis {
   std::vector<StateLaw> laws = {};
   std::vector<Spread> spreads = {};
   std::vector<Push> pushes = {};
-  std::vector<double> scatter = {};      ///< by transition: scores are so many times as large; empty: 1
-  std::vector<double> memory = {};       ///< by score: correlation with the one before; empty: 0
-  std::vector<double> sensor_sd = {};    ///< by sensor
-  std::vector<double> added_noise = {};  ///< by sensor: sd of an error beside it
-  std::vector<double> bias = {};         ///< by sensor: what is seen is so much more than the state
-  double outliers = 0;                   ///< share of steps whose scores are drawn wide
-  double wild = 0;                       ///< share of rows that say nothing of the state
+  std::vector<double> scatter = {};         ///< by transition: scores are so many times as large; empty: 1
+  std::vector<double> memory = {};          ///< by score: correlation with the one before; empty: 0
+  std::vector<double> sensor_sd = {};       ///< by sensor
+  std::vector<double> added_noise = {};     ///< by sensor: sd of an error beside it
+  std::vector<double> bias = {};            ///< by sensor: what is seen is so much more than the state
+  std::vector<double> launch_offset = {};   ///< by state: launches are at so much more than is stated; empty: 0
+  std::vector<double> launch_scatter = {};  ///< by state: sd by which they scatter beside what is stated; empty: 0
+  double outliers = 0;                      ///< share of steps whose scores are drawn wide
+  double wild = 0;                          ///< share of rows that say nothing of the state
 };
+
+/// The mean and the sd of a state's launches.
+struct NormalLaunch {
+  double mean, sd;
+};
+/// Returns how a state is launched under a hypothesis. @param state  index of the state that the launch is of
+NormalLaunch supposed_launch(const MachineHypothesis& hypothesis, const MachineLaunch& launch, std::size_t state);
 
 /// Adds to a number of a hypothesis, transition by transition. Its numbers are the values of the map, then what each
 /// state is pushed by, then the logarithm of the scores' scatter.

@@ -9,7 +9,9 @@
 #include <map>
 #include <numbers>
 #include <numeric>
+#include <optional>
 #include <stdexcept>
+#include <utility>
 
 #include "analysis/statistics/median.h"
 
@@ -69,6 +71,24 @@ void require_clock(const MachineRuns& runs) {
                                                 latest));
       if (!std::isnan(row.time)) latest = row.time;
     }
+  }
+}
+
+// A column that says which machine a trial is of settles it: one set of parameters cannot be two machines'.
+void require_one_machine(const MachineRuns& runs) {
+  for (std::size_t l = 0; l < runs.labels.size(); ++l) {
+    if (runs.labels[l].name != "machine") continue;
+    std::optional<std::pair<int, std::size_t>> first;  // its value, and the trial that has it
+    for (std::size_t t = 0; t < runs.trials.size(); ++t)
+      for (const MachineRow& row : runs.trials[t].rows) {
+        if (row.labels.size() <= l || row.labels[l] < 0) continue;
+        if (!first) first = {row.labels[l], t};
+        if (row.labels[l] != first->first)
+          throw std::invalid_argument(
+              fmt::format("machine: trial {} is of {} and trial {} of {}: give each machine runs of its own",
+                          runs.name_of(first->second), runs.labels[l].values[static_cast<std::size_t>(first->first)],
+                          runs.name_of(t), runs.labels[l].values[static_cast<std::size_t>(row.labels[l])]));
+      }
   }
 }
 
@@ -409,6 +429,7 @@ std::vector<std::string> look_over(const Machine& machine, const MachineRuns& ru
   machine.require_valid();
   require_shape(machine, runs);
   require_clock(runs);
+  require_one_machine(runs);
   const std::size_t transitions = runs.transitions();
   if (transitions == 0)
     throw std::invalid_argument("runs: no trial has two rows one after the other: there is no transition");

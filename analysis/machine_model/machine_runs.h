@@ -62,8 +62,9 @@ ColumnSpread column_spread(const MachineRuns& runs, std::size_t sensor);
 /// a column that is constant in some trials, an input that is in all; trials that are there twice; first rows whose
 /// mean is four standard errors and more off the launch that is stated.
 /// @throws std::invalid_argument where they do not fit the machine: no transition, fewer rows than parameters, rows of
-///   another shape, time that runs back within a trial, a state that is constant, a first row that lacks a state
-///   without launch; where the map makes something else of the same rows when it is asked again
+///   another shape, time that runs back within a trial, a label "machine" with two values, a state that is constant, a
+///   first row that lacks a state without launch; where the map makes something else of the same rows when it is asked
+///   again
 std::vector<std::string> look_over(const Machine& machine, const MachineRuns& runs);
 
 }  // namespace metastable::analysis

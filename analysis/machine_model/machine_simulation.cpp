@@ -66,11 +66,12 @@ MachineRuns all_trials(std::span<const MachineRuns> experiments) {
 class Walker {
  public:
   Walker(const Machine& machine, std::span<const MachineRuns> experiments, const MachineHypothesis& supposed,
-         std::span<const std::uint64_t> seeds)
+         std::span<const std::uint64_t> seeds, Launches launches)
       : machine_(machine),
         runs_(all_trials(experiments)),
         supposed_(supposed),
         seeds_(seeds),
+        launches_(launches),
         each_(experiments.front().trials.size()),
         stepper_(machine, runs_, supposed) {
     for (const MachineRuns& one : experiments) designs_.push_back(machine_design(machine, one));
@@ -80,7 +81,8 @@ class Walker {
  private:
   std::size_t planned(std::size_t trial) const;
   std::size_t design_row(std::size_t trial, std::size_t row) const;
-  Walking launched(std::size_t trial) const;
+  Walking launched(std::size_t trial, MachineRow& first) const;
+  bool drawn_launch(std::size_t sensor, const MachineRow& row) const;
   double error(std::size_t sensor, double now, double before) const;
   MachineRow seen(std::size_t trial, std::size_t row, Walking& walking) const;
   std::vector<MachineRuns> apart(MachineRuns all) const;
@@ -90,7 +92,8 @@ class Walker {
   MachineRuns runs_;
   const MachineHypothesis& supposed_;
   std::span<const std::uint64_t> seeds_;  // by experiment
-  std::size_t each_;                      // trials of an experiment
+  Launches launches_;
+  std::size_t each_;  // trials of an experiment
   MachineStepper stepper_;
   std::vector<MachineDesign> designs_;  // by experiment
 };
@@ -111,23 +114,42 @@ double Walker::error(std::size_t sensor, double now, double before) const {
   return supposed_.sensor_sd[sensor] * (own * now + kept * before);
 }
 
-Walking Walker::launched(std::size_t trial) const {
+// Says whether the value of a first row is drawn from the launch that is stated.
+bool Walker::drawn_launch(std::size_t sensor, const MachineRow& row) const {
+  return launches_ == Launches::stated && !std::isnan(row.seen[sensor]) &&
+         machine_.stated_launch(machine_.observe[sensor].state);
+}
+
+// @param first  the measured row of the trial's first state, where values that are drawn are put
+Walking Walker::launched(std::size_t trial, MachineRow& first) const {
   const Draws draws = draws_of(trial);
   const MachineRow& row = runs_.trials[trial].rows.front();
+  const bool is_wild = draws.uniform(0, wild) < supposed_.wild;
   Walking walking{Eigen::VectorXd::Zero(static_cast<Eigen::Index>(stepper_.size())),
                   Eigen::VectorXd::Zero(static_cast<Eigen::Index>(machine_.observe.size())), false};
-  for (std::size_t l = 0; l < machine_.launches.size(); ++l)
-    walking.point[static_cast<Eigen::Index>(machine_.state_index(machine_.launches[l].state))] =
-        machine_.launches[l].mean +
-        (machine_.launches[l].assumed ? 0 : machine_.launches[l].sd * draws.normal(0, launch + l));
+  for (std::size_t l = 0; l < machine_.launches.size(); ++l) {
+    const std::size_t s = machine_.state_index(machine_.launches[l].state);
+    const NormalLaunch at = supposed_launch(supposed_, machine_.launches[l], s);
+    walking.point[static_cast<Eigen::Index>(s)] =
+        at.mean + (machine_.launches[l].assumed ? 0 : at.sd * draws.normal(0, launch + l));
+  }
   for (std::size_t j = 0; j < machine_.observe.size(); ++j) {
     const auto at = static_cast<Eigen::Index>(j);
+    const std::size_t s = machine_.state_index(machine_.observe[j].state);
     walking.errors[at] = draws.normal(0, errors + j);
     if (std::isnan(row.seen[j])) continue;
     double off = error(j, walking.errors[at], draws.normal(0, earlier + j));
     if (!supposed_.added_noise.empty()) off += supposed_.added_noise[j] * draws.normal(0, added + j);
+    double& point = walking.point[static_cast<Eigen::Index>(s)];
+    if (drawn_launch(j, row)) {
+      const NormalLaunch from = supposed_launch(supposed_, *machine_.stated_launch(machine_.observe[j].state), s);
+      if (is_wild) off = wild_width * std::hypot(from.sd, supposed_.sensor_sd[j]) * draws.normal(0, wild_error + j);
+      if (!supposed_.bias.empty()) off += supposed_.bias[j];
+      first.seen[j] = point + off;
+      continue;
+    }
     if (!supposed_.bias.empty()) off += supposed_.bias[j];
-    walking.point[static_cast<Eigen::Index>(machine_.state_index(machine_.observe[j].state))] = row.seen[j] - off;
+    point = row.seen[j] - off;
   }
   Eigen::Index at = static_cast<Eigen::Index>(stepper_.states());
   for (std::size_t i = 0; i < supposed_.spreads.size(); ++i, ++at)
@@ -172,7 +194,7 @@ std::vector<MachineRuns> Walker::walk() {
       walking.push_back({{}, {}, true});
       continue;
     }
-    walking.push_back(launched(t));
+    walking.push_back(launched(t, out.trials[t].rows.front()));
     out.trials[t].rows.resize(1);
     if (out.trials[t].outcome == MachineOutcome::failed) out.trials[t].outcome = MachineOutcome::stopped;
   }
@@ -297,13 +319,14 @@ MachineRuns redrawn_launches(const MachineRuns& runs, std::uint64_t seed) {
 }
 
 MachineRuns simulate_machine(const Machine& machine, const MachineRuns& runs, const MachineHypothesis& supposed,
-                             std::uint64_t seed) {
-  return std::move(simulate_machines(machine, {&runs, 1}, supposed, {&seed, 1}).front());
+                             std::uint64_t seed, Launches launches) {
+  return std::move(simulate_machines(machine, {&runs, 1}, supposed, {&seed, 1}, launches).front());
 }
 
 std::vector<MachineRuns> simulate_machines(const Machine& machine, std::span<const MachineRuns> experiments,
-                                           const MachineHypothesis& supposed, std::span<const std::uint64_t> seeds) {
-  return Walker(machine, experiments, supposed, seeds).walk();
+                                           const MachineHypothesis& supposed, std::span<const std::uint64_t> seeds,
+                                           Launches launches) {
+  return Walker(machine, experiments, supposed, seeds, launches).walk();
 }
 
 }  // namespace metastable::analysis

@@ -9,16 +9,22 @@
 
 namespace metastable::analysis {
 
-/// Draws the same design (trials, launches, columns, what is missing) under a hypothesis. Launches are those measured,
-/// less an error drawn anew. A trial that failed may go on to the length of the longest. The same seed gives the same
-/// data.
+/// Says where trials that are drawn begin.
+enum class Launches {
+  measured,  ///< at the measured first rows, less an error drawn anew
+  stated     ///< where the launch of a state is stated, at values drawn from that; else as above
+};
+
+/// Draws the same design (trials, columns, what is missing) under a hypothesis. A trial that failed may go on to the
+/// length of the longest. The same seed gives the same data.
 MachineRuns simulate_machine(const Machine& machine, const MachineRuns& runs, const MachineHypothesis& supposed,
-                             std::uint64_t seed);
+                             std::uint64_t seed, Launches launches = Launches::measured);
 /// Draws several experiments, each as simulate_machine() does by its seed; the map is called once a step number for
 /// all.
 /// @param experiments  at least one: the same design, launches apart
 std::vector<MachineRuns> simulate_machines(const Machine& machine, std::span<const MachineRuns> experiments,
-                                           const MachineHypothesis& supposed, std::span<const std::uint64_t> seeds);
+                                           const MachineHypothesis& supposed, std::span<const std::uint64_t> seeds,
+                                           Launches launches = Launches::measured);
 
 /// Draws first rows anew, as likely as the measured ones of trials with the same condition, phase, labels and columns:
 /// from their smoothed distribution (SmoothSample), of which the errors of the sensors are no part once

@@ -58,6 +58,7 @@ class MachineTransitions : public TransitionModel {
   int legs() const override { return static_cast<int>(runs_.phases.size()); }
   bool time_tells() const override { return false; }
   std::string condition_name(std::size_t condition) const override { return runs_.conditions.at(condition); }
+  std::string trial_name(std::size_t trial) const override { return runs_.name_of(trial); }
   std::string recalibrated() const override { return "parameters"; }
   std::vector<ObservedColumn> columns() const override {
     std::vector<ObservedColumn> all;
@@ -107,13 +108,14 @@ class MachineTransitions : public TransitionModel {
   }
   std::unique_ptr<TransitionModel> simulate(std::span<const double> nuisance, std::span<const EffectTerm> terms,
                                             std::uint64_t seed) const override {
-    return drawn(runs_, nuisance, terms, seed);
+    return drawn(runs_, nuisance, terms, seed, Launches::stated);
   }
   std::vector<ChangedExperiment> alternatives(std::span<const double> nuisance, std::span<const EffectTerm> terms,
                                               std::uint64_t seed) const override {
     const std::vector<double> n(nuisance.begin(), nuisance.end());
     const std::vector<EffectTerm> t(terms.begin(), terms.end());
-    return {{"", 0, "the same experiment once more", [this, n, t, seed] { return drawn(runs_, n, t, seed); }}};
+    return {{"", 0, "the same experiment once more",
+             [this, n, t, seed] { return drawn(runs_, n, t, seed, Launches::stated); }}};
   }
   std::pair<double, double> rests() const override {
     double at_risk = 0, failed = 0;
@@ -136,7 +138,8 @@ class MachineTransitions : public TransitionModel {
 
  private:
   std::unique_ptr<MachineTransitions> drawn(const MachineRuns& like, std::span<const double> nuisance,
-                                            std::span<const EffectTerm> terms, std::uint64_t seed) const;
+                                            std::span<const EffectTerm> terms, std::uint64_t seed,
+                                            Launches launches) const;
   MachineHypothesis hypothesis(std::span<const double> nuisance, std::span<const EffectTerm> terms) const;
   void set_up_nuisances();
   void set_up_effects();
@@ -242,10 +245,10 @@ void MachineTransitions::require_noise() const {
 }
 
 std::unique_ptr<MachineTransitions> MachineTransitions::drawn(const MachineRuns& like, std::span<const double> nuisance,
-                                                              std::span<const EffectTerm> terms,
-                                                              std::uint64_t seed) const {
+                                                              std::span<const EffectTerm> terms, std::uint64_t seed,
+                                                              Launches launches) const {
   auto copy = std::make_unique<MachineTransitions>(*this);
-  copy->runs_ = simulate_machine(*machine_, like, hypothesis(nuisance, terms), seed);
+  copy->runs_ = simulate_machine(*machine_, like, hypothesis(nuisance, terms), seed, launches);
   copy->design_ = std::make_shared<MachineDesign>(machine_design(*machine_, copy->runs_));
   copy->effects_.clear();
   copy->candidates_.clear();
@@ -288,7 +291,7 @@ double MachineTransitions::expected_steps(std::span<const double> nuisance, std:
   }
   double rate = failed / steps;
   if (failed < few_failures && plan_.failing) {
-    const auto trials = drawn(smoothed_launches(runs_, supposed, seed), nuisance, terms, seed);
+    const auto trials = drawn(smoothed_launches(runs_, supposed, seed), nuisance, terms, seed, Launches::measured);
     const std::vector<double> chances = trials->rest_chances(nuisance, terms);
     double at_risk = 0, expected = 0;
     for (std::size_t e = 0; e < chances.size(); ++e)

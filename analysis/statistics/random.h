@@ -21,7 +21,8 @@ enum class DrawStream : std::uint64_t {
   folds = 4,              ///< the order in which trials go to folds
   blur = 5,               ///< errors added to speeds that are more exact than the law
   steps = 6,              ///< parameters of a fit, for its expected steps
-  machine = 7             ///< runs of a machine
+  machine = 7,            ///< runs of a machine
+  trial_groups = 8        ///< trials that swing like a sine
 };
 
 /// Returns the standard normals by which a bootstrap multiplies scores: those of draw number `draw`.

@@ -5,7 +5,6 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <map>
 #include <span>
 #include <stdexcept>
 
@@ -15,6 +14,7 @@
 #include "analysis/experiment/suggestion.h"
 #include "analysis/machine_model/machine_transitions.h"
 #include "analysis/statistics/random.h"
+#include "analysis/walker_model/steps_reader.h"
 #include "analysis/walkers/walker_study.h"
 #include "dynamics/catalogue/walker_effects.h"
 #include "dynamics/numerics/truncated_normal.h"
@@ -25,9 +25,9 @@ namespace metastable::analysis {
 namespace {
 
 constexpr double angle_error = 0.0005, compass_rate_error = 0.005, simplest_rate_error = 0.001;
-constexpr double unknown_launch = 0.3;  // sd of a first value that is not measured, in those of the gait
-constexpr std::int64_t most_steps = 1'000'000'000;
-constexpr std::string_view phase_remedy = "write 1 where leg 1 stands and 2 where leg 2 does";
+constexpr double unknown_launch = 0.3;  // sd of a first value that is not stated, in those of the gait
+constexpr std::string_view offset_of_launch = "launch_", spread_of_launch = "launch_spread_";  // a state follows
+constexpr double least_half_angle = 0.01;  // [rad] of a launch that scatters
 constexpr dynamics::Range angles{.low = 0, .high = 1.5707963267948966, .low_open = true, .high_open = true};
 constexpr dynamics::Range rates{.low = -30, .high = 30};  // [rad/s]: ten times what gaits have; degrees are beyond
 
@@ -44,125 +44,28 @@ void require_walker(const WalkDescription& told) {
                       "simulator of your own from Python, as metastable.machine() and metastable.runs()"});
 }
 
-// Reads steps.csv, and trials.csv, of walks.
-class WalkReader {
- public:
-  WalkReader(const ExperimentSource& source, const Machine& machine, MachineRuns& runs, Defects& defects)
-      : source_(source), machine_(machine), runs_(runs), defects_(defects) {}
-
-  void read() {
-    runs_.conditions.clear();
-    const std::string file = file_in(source_, "steps.csv");
-    if (!source_.steps_csv) return defects_.add(file, {}, "there is no such file; walks need it");
-    std::vector<CsvColumn> columns{{"condition"}, {"trial", true}, {"step", true}, {"phase", false, phase_remedy},
-                                   {"time_s"},    {"position_m"}};
-    for (const MachineSensor& sensor : machine_.observe) columns.push_back({sensor.state});
-    CsvReader csv(file, *source_.steps_csv, columns, defects_);
-    for (const MachineSensor& sensor : machine_.observe)
-      if (!csv.has(state_ + static_cast<std::size_t>(&sensor - machine_.observe.data())))
-        defects_.add(file, {1, 1}, fmt::format("there is no column {}, which experiment.toml states", sensor.state));
-    if (csv.has(phase_)) runs_.phases = {"1", "2"};
-    while (csv.next()) read_row(csv);
-    if (runs_.trials.empty() && defects_.empty()) defects_.add(file, {}, "holds no step");
-    if (source_.trials_csv) read_outcomes();
-  }
-
- private:
-  enum Columns : std::size_t { condition_, trial_, step_, phase_, time_, position_, state_ };
-  using Key = std::pair<std::string, std::int64_t>;
-
-  static std::string condition_of(const CsvReader& csv) {
-    return csv.text(condition_).empty() ? "all" : std::string(csv.text(condition_));
-  }
-
-  void read_row(CsvReader& csv) {
-    std::optional<std::int64_t> trial, step, phase;
-    std::optional<double> time, position;
-    const bool counted = csv.read(trial_, 1, most_steps, trial) && csv.read(step_, 1, most_steps, step);
-    csv.read(phase_, 1, 2, phase);
-    csv.read(time_, dynamics::range::time, time);
-    csv.read(position_, dynamics::range::position, position);
-    MachineRow row;
-    for (std::size_t j = 0; j < machine_.observe.size(); ++j) {
-      std::optional<double> value;
-      csv.read(state_ + j, machine_.observe[j].state == "half_angle_rad" ? angles : rates, value);
-      row.seen.push_back(value.value_or(std::nan("")));
-    }
-    if (!counted) return;
-    row.time = time.value_or(std::nan(""));
-    row.position = position.value_or(std::nan(""));
-    row.phase = phase ? static_cast<int>(*phase) - 1 : -1;
-    if (!machine_.inputs.empty()) {
-      if (csv.text(phase_).empty())
-        csv.refuse(phase_, "is missing: which leg stands, 1 or 2, is given in every row or in none");
-      row.inputs = {static_cast<double>(phase.value_or(1))};
-    }
-    place(csv, {condition_of(csv), *trial}, *step, std::move(row));
-  }
-
-  void place(CsvReader& csv, Key key, std::int64_t step, MachineRow row) {
-    if (runs_.trials.empty() || key != last_) {
-      if (!trials_.emplace(key, runs_.trials.size()).second)
-        return csv.refuse(trial_, fmt::format("the rows of trial {} do not stand together", key.second));
-      auto at = std::ranges::find(runs_.conditions, key.first);
-      if (at == runs_.conditions.end()) at = runs_.conditions.insert(at, key.first);
-      runs_.trials.push_back(
-          {static_cast<std::size_t>(at - runs_.conditions.begin()), {}, {}, fmt::format("{}", key.second)});
-      last_ = key;
-    }
-    std::vector<MachineRow>& rows = runs_.trials.back().rows;
-    if (step != static_cast<std::int64_t>(rows.size()) + 1)
-      return csv.refuse(step_, fmt::format("{} is not due: step {} of trial {} is", step, rows.size() + 1, key.second));
-    if (!rows.empty() && row.time <= rows.back().time)
-      return csv.refuse(time_, fmt::format("{} does not come after {} of the step before", row.time, rows.back().time));
-    rows.push_back(std::move(row));
-  }
-
-  void read_outcomes() {
-    constexpr CsvColumn columns[] = {{"condition"}, {"trial", true}, {"outcome", true}};
-    CsvReader csv(file_in(source_, "trials.csv"), *source_.trials_csv, columns, defects_);
-    while (csv.next()) {
-      std::optional<std::int64_t> trial;
-      if (!csv.read(1, 1, most_steps, trial)) continue;
-      const auto at = trials_.find({condition_of(csv), *trial});
-      if (at == trials_.end()) {
-        csv.refuse(1, fmt::format("steps.csv has no trial {}", *trial));
-        continue;
-      }
-      const std::string_view told = csv.text(2);
-      std::optional<MachineOutcome>& outcome = runs_.trials[at->second].outcome;
-      if (outcome) {
-        csv.refuse(1, fmt::format("trial {} was there before", *trial));
-        continue;
-      }
-      if (told == "failed")
-        outcome = MachineOutcome::failed;
-      else if (told == "stopped")
-        outcome = MachineOutcome::stopped;
-      else if (told == "lost")
-        outcome = MachineOutcome::lost;
-      else
-        csv.refuse(2, fmt::format("{} is none of failed, stopped, lost", shown_text(told)));
-    }
-  }
-
-  const ExperimentSource& source_;
-  const Machine& machine_;
-  MachineRuns& runs_;
-  Defects& defects_;
-  std::map<Key, std::size_t> trials_;
-  Key last_;
+// How walks that are drawn begin beside the gait, by state.
+struct DrawnLaunch {
+  std::vector<double> offset, scatter;
 };
 
 // Draws one walk: its rows behind the trial's number.
 class WalkDrawer {
  public:
-  WalkDrawer(const Machine& machine, std::vector<double> values, const WalkOptions& options, double rate_error)
-      : machine_(machine), values_(std::move(values)), options_(options), rate_error_(rate_error) {}
+  WalkDrawer(const Machine& machine, std::vector<double> values, DrawnLaunch launch, const WalkOptions& options,
+             double rate_error)
+      : machine_(machine),
+        values_(std::move(values)),
+        launch_(std::move(launch)),
+        options_(options),
+        rate_error_(rate_error) {}
 
-  // Returns whether it fell.
+  // Returns whether it fell. @param state  where walks begin without an effect of the launch
   bool draw(std::size_t trial, std::vector<double> state, std::string& rows) const {
     std::vector<double> next(state.size()), values = values_;
+    for (std::size_t s = 0; s < state.size(); ++s)
+      state[s] += launch_.offset[s] + launch_.scatter[s] * normal(trial, before_all, s);
+    state[0] = std::max(least_half_angle, state[0]);
     std::uint64_t leg = trial % 2;
     for (std::uint64_t step = 0;; ++step, leg = 1 - leg) {
       rows += fmt::format("{},{},{}", trial + 1, step + 1, leg + 1);
@@ -182,6 +85,8 @@ class WalkDrawer {
   }
 
  private:
+  static constexpr std::uint64_t before_all = std::uint64_t{1} << 40;  // a step that no walk takes
+
   double normal(std::size_t trial, std::uint64_t step, std::size_t purpose) const {
     return dynamics::normal_quantile(
         uniform_at(options_.seed, trial, 4 * step + purpose, static_cast<std::uint64_t>(DrawStream::machine)));
@@ -189,6 +94,7 @@ class WalkDrawer {
 
   const Machine& machine_;
   std::vector<double> values_;
+  DrawnLaunch launch_;
   const WalkOptions& options_;
   double rate_error_;
 };
@@ -210,6 +116,38 @@ dynamics::EffectInfo info_of(Walker walker, const MachineEffect& effect) {
     if (walker == Walker::simplest) info.parameters[p].unit.clear();  // it has units of its own
   }
   return info;
+}
+
+// Lists the effects of the launch that a machine's walks may have.
+std::vector<dynamics::EffectInfo> launch_effects(const Machine& machine) {
+  std::vector<dynamics::EffectInfo> all;
+  for (const std::string_view what : {offset_of_launch, spread_of_launch})
+    for (const std::string& state : machine.states)
+      all.push_back(dynamics::walker_effect_info(std::string(what) + state));
+  return all;
+}
+
+// Takes what changes the launch out of the effects, and returns it.
+DrawnLaunch take_launch(const Machine& machine, std::vector<std::pair<std::string, double>>& effects) {
+  const std::size_t states = machine.states.size();
+  DrawnLaunch launch{std::vector<double>(states), std::vector<double>(states)};
+  std::vector<std::pair<std::string, double>> others;
+  const std::vector<dynamics::EffectInfo> infos = launch_effects(machine);
+  for (const auto& [name, value] : effects) {
+    const auto info = std::ranges::find_if(
+        infos, [&](const dynamics::EffectInfo& one) { return name == one.id + "." + one.parameters.front().name; });
+    if (info == infos.end()) {
+      others.emplace_back(name, value);
+      continue;
+    }
+    const dynamics::EffectParameter& of = info->parameters.front();
+    if (!(value >= of.lower && value <= of.upper))
+      throw std::invalid_argument(fmt::format("--effect: {}: {} is outside [{}, {}]", name, value, of.lower, of.upper));
+    const auto at = static_cast<std::size_t>(info - infos.begin());
+    (at < states ? launch.offset : launch.scatter)[at % states] = value;
+  }
+  effects = std::move(others);
+  return launch;
 }
 
 // Returns the machine's values with those of the effects.
@@ -278,14 +216,25 @@ std::optional<Walks> parse_walks(const ExperimentSource& source) {
   auto machine = std::make_shared<Machine>(walker_machine(statement));
   for (const WalkDescription::Column& column : told->columns)
     machine->observe.push_back({column.state, column.sd, column.correlation});
-  // A value that a trial's first row lacks is around the gait's.
+  // Without a launch that is stated, a value that a trial's first row lacks is around the gait's.
   const dynamics::TwoLinkWalker walker = statement.setting.map().walker();
   const std::vector<double> gait =
       gait_state(statement.setting, dynamics::find_gait(walker, statement.setting.slope_deg * degree));
-  for (std::size_t s = 0; s < machine->states.size(); ++s)
-    machine->launches.push_back({machine->states[s], gait[s], unknown_launch * std::abs(gait[s]), true});
+  for (std::size_t s = 0; s < machine->states.size(); ++s) {
+    const auto stated = std::ranges::find(told->launches, machine->states[s], &std::pair<std::string, Spread>::first);
+    if (stated != told->launches.end())
+      machine->launches.push_back({machine->states[s], stated->second.mean, stated->second.sd, false});
+    else
+      machine->launches.push_back({machine->states[s], gait[s], unknown_launch * std::abs(gait[s]), true});
+  }
   Walks walks{told->title, {}, {}};
-  WalkReader(source, *machine, walks.runs, defects).read();
+  StepColumns columns;
+  for (const MachineSensor& sensor : machine->observe)
+    columns.states.emplace_back(sensor.state, sensor.state == "half_angle_rad" ? angles : rates);
+  columns.labels = told->labels;
+  columns.legs = true;
+  columns.leg_is_input = !machine->inputs.empty();
+  read_steps(source, columns, walks.runs, defects);
   defects.check();
   walks.machine = std::move(machine);
   return walks;
@@ -318,6 +267,10 @@ std::string walk_toml(const WalkStatement& statement) {
       setting.slope_sd_deg, statement.walker.roughness_known_deg.value_or(setting.slope_sd_deg));
   for (const auto& [state, sd] : statement.columns)
     text += sd ? fmt::format("{} = {{ sd = {} }}\n", state, *sd) : fmt::format("{} = {{}}\n", state);
+  if (statement.launches.empty()) return text;
+  text += "\n[launch]               # where trials begin, and the sd by which they scatter there\n";
+  for (const auto& [state, launch] : statement.launches)
+    text += fmt::format("{} = {{ mean = {:.9g}, sd = {:.6g} }}\n", state, launch.mean, launch.sd);
   return text;
 }
 
@@ -349,22 +302,25 @@ std::vector<dynamics::EffectInfo> effects_known_to(Walker walker) {
 std::vector<std::pair<std::string, double>> effects_of_walks(WalkerSetting setting,
                                                              const std::vector<std::string>& texts) {
   setting.terrain = dynamics::Terrain::fresh;
-  const std::vector<MachineEffect> effects = walker_machine(drawn_walker(setting)).effects;
+  const Machine machine = walker_machine(drawn_walker(setting));
+  std::vector<dynamics::EffectInfo> infos;
+  for (const MachineEffect& effect : machine.effects) infos.push_back(info_of(setting.walker, effect));
+  for (dynamics::EffectInfo& info : launch_effects(machine)) infos.push_back(std::move(info));
   std::vector<std::string> known;
-  for (const MachineEffect& effect : effects) known.push_back(effect.id);
+  for (const dynamics::EffectInfo& info : infos) known.push_back(info.id);
   std::vector<std::pair<std::string, double>> values;
   for (const std::string& text : texts) {
     const std::string id = text.substr(0, text.find(':'));
     require_word("--effect", id, known);
-    const MachineEffect& effect = *std::ranges::find(effects, id, &MachineEffect::id);
-    const dynamics::Effect read = dynamics::effect_from_text(text, {}, info_of(setting.walker, effect));
-    for (std::size_t p = 0; p < effect.parameters.size(); ++p)
-      values.emplace_back(id + "." + effect.parameters[p].name, read.values[p]);
+    const dynamics::EffectInfo& info = *std::ranges::find(infos, id, &dynamics::EffectInfo::id);
+    const dynamics::Effect read = dynamics::effect_from_text(text, {}, info);
+    for (std::size_t p = 0; p < info.parameters.size(); ++p)
+      values.emplace_back(id + "." + info.parameters[p].name, read.values[p]);
   }
   return values;
 }
 
-WalkFiles draw_walks(const WalkerSetting& setting, const std::vector<std::pair<std::string, double>>& effects,
+WalkFiles draw_walks(const WalkerSetting& setting, std::vector<std::pair<std::string, double>> effects,
                      const WalkOptions& options, const std::string& title) {
   const WalkerStatement statement = drawn_walker(setting);
   const Machine machine = walker_machine(statement);
@@ -377,11 +333,13 @@ WalkFiles draw_walks(const WalkerSetting& setting, const std::vector<std::pair<s
   for (const std::string& state : machine.states) {
     files.steps_csv += "," + state;
     told.columns.emplace_back(state, state == "half_angle_rad" ? angle_error : rate_error);
+    told.launches.emplace_back(state, Spread{start[told.launches.size()], 0});
   }
   files.experiment_toml = walk_toml(told);
   files.steps_csv += "\n";
   files.trials_csv = "trial,outcome\n";
-  const WalkDrawer drawer(machine, values_with(machine, effects), options, rate_error);
+  DrawnLaunch launch = take_launch(machine, effects);
+  const WalkDrawer drawer(machine, values_with(machine, effects), std::move(launch), options, rate_error);
   std::vector<std::string> rows(options.trials);
   std::vector<std::uint8_t> fell(options.trials);
   markov::parallel_for(

@@ -55,6 +55,7 @@ struct WalkStatement {
   WalkerStatement walker;
   std::vector<std::pair<std::string, std::optional<double>>> columns = {};  ///< states, with the sd of each one's error
   std::vector<std::string> comment = {};                                    ///< its lines come first, behind "# "
+  std::vector<std::pair<std::string, Spread>> launches = {};  ///< states, with mean and sd of their first values
 };
 /// Returns the experiment.toml that says so.
 std::string walk_toml(const WalkStatement& statement);
@@ -74,9 +75,10 @@ std::vector<std::pair<std::string, double>> effects_of_walks(WalkerSetting setti
 /// Draws walks of a walker with effects, as WalkOptions says, which start in the gait of the ideal one, and measures
 /// them with errors of 0.0005 rad and, for the rates, 0.005 rad/s (simplest: 0.001). A row is a state just after a
 /// strike; what becomes of the last row of WalkOptions::longest is not told.
-/// @param effects  parameters of walker_machine()'s effects, "hip_damping.damping" and values
+/// @param effects  parameters of walker_machine()'s effects, "hip_damping.damping", and of the launch_STATE of
+///   walker_effects(), and values
 /// @throws std::invalid_argument for an effect or value that the machine does not have
-WalkFiles draw_walks(const WalkerSetting& setting, const std::vector<std::pair<std::string, double>>& effects,
+WalkFiles draw_walks(const WalkerSetting& setting, std::vector<std::pair<std::string, double>> effects,
                      const WalkOptions& options, const std::string& title);
 
 }  // namespace metastable::analysis

@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <cmath>
 #include <set>
 #include <stdexcept>
 
@@ -55,6 +56,14 @@ WalkFiles laboratory_walks(const dynamics::WalkerLaboratory& laboratory,
   const std::array<double, 3>& sd = laboratory.setup().sensor_sd;
   if (statement.columns.empty())
     statement.columns = {{"half_angle_rad", sd[0]}, {"stance_rate_rad_s", sd[1]}, {"swing_rate_rad_s", sd[2]}};
+  if (statement.launches.empty()) {
+    const dynamics::RodStride& launch = laboratory.setup().launch;
+    const double spread = laboratory.setup().launch_spread;
+    for (const auto& [state, mean] :
+         {std::pair("half_angle_rad", launch.half_angle), std::pair("stance_rate_rad_s", launch.stance_rate),
+          std::pair("swing_rate_rad_s", launch.swing_rate)})
+      statement.launches.emplace_back(state, Spread{mean, spread * std::abs(mean)});
+  }
   WalkFiles files;
   files.experiment_toml = walk_toml(statement);
   files.steps_csv = "trial,step";

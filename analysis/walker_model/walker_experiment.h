@@ -27,7 +27,8 @@ dynamics::WalkerLaboratory walker_laboratory(const WalkerSetting& truth, const W
 /// Runs all trials in the order they were run. They have the same bits on any number of threads.
 std::vector<dynamics::WalkedTrial> run_walks(const dynamics::WalkerLaboratory& laboratory, const WalkOptions& options);
 
-/// Returns the folder of these walks. @param statement  without columns: those of the laboratory's sensors
+/// Returns the folder of these walks. @param statement  without columns: those of the laboratory's sensors; without
+///   launches: the laboratory's, without what an effect does to them
 /// @throws std::invalid_argument for an unknown name in `left_out`
 WalkFiles laboratory_walks(const dynamics::WalkerLaboratory& laboratory,
                            const std::vector<dynamics::WalkedTrial>& trials, WalkStatement statement,

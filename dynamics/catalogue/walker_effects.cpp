@@ -33,6 +33,19 @@ void add_sensors(std::vector<EffectInfo>& all) {
   }
 }
 
+void add_launches(std::vector<EffectInfo>& all) {
+  for (const auto& [state, unit, most] : {std::tuple("half_angle_rad", "rad", 0.1),
+                                          {"stance_rate_rad_s", "rad/s", 1.0},
+                                          {"swing_rate_rad_s", "rad/s", 1.0}}) {
+    all.push_back({fmt::format("launch_{}", state),
+                   fmt::format("walks begin with another {} than stated", state),
+                   {sized("offset", unit, -most, most, "added to the stated mean of first values")}});
+    all.push_back({fmt::format("launch_spread_{}", state),
+                   fmt::format("the {} with which walks begin scatters more than stated", state),
+                   {sized("sd_between_trials", unit, 0, 0.5 * most, "of first values, beside the stated sd")}});
+  }
+}
+
 std::vector<EffectInfo> make_effects() {
   std::vector<EffectInfo> all{
       {"hip_damping",
@@ -84,6 +97,7 @@ std::vector<EffectInfo> make_effects() {
        {sized("share", "", 0, 0.2, "of the steps")}},
   };
   add_sensors(all);
+  add_launches(all);
   return all;
 }
 

@@ -15,7 +15,8 @@ enum class LaboratoryDraw : std::uint64_t {
   walk_sensor = 111,
   walk_noise = 112,
   walk_trial = 113,
-  walk_sway = 114
+  walk_sway = 114,
+  walk_launch = 115
 };
 
 /// Returns four independent numbers, even on (0, 1), of Philox at (trial, event, purpose) under the seed.

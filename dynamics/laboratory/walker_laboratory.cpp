@@ -23,6 +23,7 @@ namespace {
 constexpr double radians = std::numbers::pi / 180;
 constexpr double outlier_ratio = 4;     // of the slope's spread, as the catalogue has it
 constexpr double clock_for_a_step = 2;  // [s] that the clock leaves for a step of each trial
+constexpr double least_half_angle = 0.01, largest_half_angle = 1.5;  // [rad] of a launch that scatters
 
 void require_walk(bool fine, const char* name, double value, const char* range) {
   if (!fine) throw std::invalid_argument(fmt::format("laboratory: {}: {} is outside {}", name, value, range));
@@ -72,7 +73,7 @@ WalkerLaboratory::WalkerLaboratory(WalkerLaboratorySetup setup) : setup_(std::mo
   require_walk(s.longest >= 1, "longest", static_cast<double>(s.longest), "[1, inf)");
   for (const double sd : s.sensor_sd) require_walk(sd >= 0, "sensor_sd", sd, "[0, inf)");
   using Values = const std::vector<double>&;
-  const std::map<std::string, std::function<void(Values)>, std::less<>> acts{
+  std::map<std::string, std::function<void(Values)>, std::less<>> acts{
       {"hip_damping", [&](Values v) { walker_.hip_damping = v[0]; }},
       {"hip_dry_friction", [&](Values v) { walker_.hip_friction = v[0]; }},
       {"impact_loss", [&](Values v) { walker_.impact_loss = v[0]; }},
@@ -90,13 +91,14 @@ WalkerLaboratory::WalkerLaboratory(WalkerLaboratorySetup setup) : setup_(std::mo
       {"slope_deg_clock", [&](Values v) { terrain_.clock = v[0], terrain_.clock_hz = v[1]; }},
       {"slope_deg_stretch", [&](Values v) { terrain_.stretch = v[0], terrain_.from = v[1], terrain_.to = v[2]; }},
       {"memory", [&](Values v) { terrain_.memory = v[0]; }},
-      {"outliers", [&](Values v) { terrain_.outliers = v[0]; }},
-      {"sensor_noise_half_angle_rad", [&](Values v) { added_noise_[0] = v[0]; }},
-      {"sensor_noise_stance_rate_rad_s", [&](Values v) { added_noise_[1] = v[0]; }},
-      {"sensor_noise_swing_rate_rad_s", [&](Values v) { added_noise_[2] = v[0]; }},
-      {"sensor_bias_half_angle_rad", [&](Values v) { bias_[0] = v[0]; }},
-      {"sensor_bias_stance_rate_rad_s", [&](Values v) { bias_[1] = v[0]; }},
-      {"sensor_bias_swing_rate_rad_s", [&](Values v) { bias_[2] = v[0]; }}};
+      {"outliers", [&](Values v) { terrain_.outliers = v[0]; }}};
+  constexpr std::array states{"half_angle_rad", "stance_rate_rad_s", "swing_rate_rad_s"};
+  for (std::size_t i = 0; i < states.size(); ++i)
+    for (const auto& [what, numbers] : {std::pair("sensor_noise_", &added_noise_),
+                                        {"sensor_bias_", &bias_},
+                                        {"launch_", &launch_offset_},
+                                        {"launch_spread_", &launch_scatter_}})
+      acts[std::string(what) + states[i]] = [&number = (*numbers)[i]](Values v) { number = v[0]; };
   std::set<std::string> seen;
   for (const Effect& effect : s.effects) {
     const EffectInfo& info = walker_effect_info(effect.id);
@@ -136,9 +138,12 @@ WalkedTrial WalkerLaboratory::run(std::size_t index) const {
   const std::array<double, 4> own = laboratory_normals(seed, index, 0, LaboratoryDraw::walk_trial);
   RodWalkerOptions options = walker_;
   options.sway_phase_rad = 2 * std::numbers::pi * laboratory_uniforms(seed, index, 0, LaboratoryDraw::walk_sway)[0];
-  const auto launched = [&](double value, std::size_t i) { return value * (1 + setup_.launch_spread * own[i]); };
-  const RodStride launch{launched(setup_.launch.half_angle, 1), launched(setup_.launch.stance_rate, 2),
-                         launched(setup_.launch.swing_rate, 3)};
+  const std::array<double, 4> off = laboratory_normals(seed, index, 0, LaboratoryDraw::walk_launch);
+  const auto launched = [&](double value, std::size_t i) {
+    return value * (1 + setup_.launch_spread * own[i + 1]) + launch_offset_[i] + launch_scatter_[i] * off[i];
+  };
+  const RodStride launch{std::clamp(launched(setup_.launch.half_angle, 0), least_half_angle, largest_half_angle),
+                         launched(setup_.launch.stance_rate, 1), launched(setup_.launch.swing_rate, 2)};
   RodWalker walker(options, static_cast<int>(index % 2), launch);
   const double start = clock_for_a_step * static_cast<double>(setup_.longest) * static_cast<double>(index);
   const double first_foot = walker.position();

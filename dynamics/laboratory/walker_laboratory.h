@@ -72,7 +72,7 @@ class WalkerLaboratory {
   WalkerLaboratorySetup setup_;
   RodWalkerOptions walker_;
   Terrain terrain_;
-  std::array<double, 3> added_noise_{}, bias_{};
+  std::array<double, 3> added_noise_{}, bias_{}, launch_offset_{}, launch_scatter_{};  // by number of the state
 };
 
 }  // namespace metastable::dynamics

@@ -283,6 +283,12 @@ std::string diagnosis_json(const analysis::Diagnosis& d, const Provenance& prove
     return Json{
         {"statement", n.statement}, {"because", n.because}, {"trials", n.trials ? Json(*n.trials) : Json(nullptr)}};
   });
+  json["at_bound"] = list_json(d.limits.at_bound, [](const analysis::AtBound& one) {
+    return Json{{"effect", one.of.empty() ? Json(nullptr) : Json(one.of)},
+                {"parameter", one.parameter},
+                {"bound", one.upper ? "upper" : "lower"},
+                {"value", number(one.value)}};
+  });
   json["next_experiment"] = list_json(d.limits.next, [](const analysis::NextExperiment& next) {
     Json changes = Json::object();
     for (const auto& [kind, amount] : next.changes) changes[kind] = number(amount);

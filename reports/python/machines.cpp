@@ -11,6 +11,7 @@
 #include "analysis/diagnosis/diagnosis.h"
 #include "analysis/experiment/suggestion.h"
 #include "analysis/machine_model/machine_transitions.h"
+#include "analysis/walker_model/machine_folder.h"
 #include "analysis/walker_model/walk_folder.h"
 #include "reports/command_line/requests.h"
 #include "reports/output/version.h"
@@ -174,6 +175,50 @@ py::dict diagnose_machine(const py::dict& machine_fields, const py::dict& runs_f
   return diagnosis_answer(found, {command, "machine: " + machine->name, study.seed, version()}, figures);
 }
 
+// Reads a folder of a machine's runs, `model = "none"`: its columns by name, its labels and inputs as dicts, and the
+// outcomes in the order of the trials.
+py::dict read_runs(const py::dict& machine_fields, const std::string& folder, const std::vector<std::string>& labels) {
+  const std::shared_ptr<analysis::Machine> machine = machine_of(machine_fields);
+  const analysis::MachineRuns runs = analysis::read_machine_folder(folder, *machine, labels);
+  const auto word = [](const std::vector<std::string>& words, int index) -> py::object {
+    if (index < 0) return py::none();
+    return py::str(words[static_cast<std::size_t>(index)]);
+  };
+  py::dict columns, labelled, inputs;
+  py::list trial, condition, phase, time, position, outcomes;
+  std::vector<py::list> seen(machine->observe.size()), label(runs.labels.size()), input(machine->inputs.size());
+  for (const analysis::MachineTrial& one : runs.trials) {
+    outcomes.append(!one.outcome                                        ? py::object(py::none())
+                    : *one.outcome == analysis::MachineOutcome::failed  ? py::object(py::str("failed"))
+                    : *one.outcome == analysis::MachineOutcome::stopped ? py::object(py::str("stopped"))
+                                                                        : py::object(py::str("lost")));
+    for (const analysis::MachineRow& row : one.rows) {
+      trial.append(std::stoll(one.name));
+      condition.append(runs.conditions[one.condition]);
+      phase.append(word(runs.phases, row.phase));
+      time.append(row.time);
+      position.append(row.position);
+      for (std::size_t j = 0; j < seen.size(); ++j) seen[j].append(row.seen[j]);
+      for (std::size_t l = 0; l < label.size(); ++l) label[l].append(word(runs.labels[l].values, row.labels[l]));
+      for (std::size_t i = 0; i < input.size(); ++i) input[i].append(row.inputs[i]);
+    }
+  }
+  columns["trial"] = trial;
+  columns["condition"] = condition;
+  if (!runs.phases.empty()) columns["phase"] = phase;
+  columns["time_s"] = time;
+  columns["position_m"] = position;
+  for (std::size_t j = 0; j < seen.size(); ++j) columns[machine->observe[j].state.c_str()] = seen[j];
+  for (std::size_t l = 0; l < label.size(); ++l) labelled[runs.labels[l].name.c_str()] = label[l];
+  for (std::size_t i = 0; i < input.size(); ++i) inputs[machine->inputs[i].c_str()] = input[i];
+  py::dict all;
+  all["columns"] = columns;
+  all["labels"] = labelled;
+  all["inputs"] = inputs;
+  all["outcome"] = outcomes;
+  return all;
+}
+
 // Returns nothing for a folder that holds no walks.
 py::object diagnose_walks(const std::string& folder, const py::dict& options, const std::string& command,
                           const py::object& progress) {
@@ -207,6 +252,7 @@ void add_machines(py::module_& module) {
     machine->require_valid();
   });
   module.def("diagnose_machine", diagnose_machine);
+  module.def("read_runs", read_runs);
   module.def("diagnose_walks", diagnose_walks);
 }
 

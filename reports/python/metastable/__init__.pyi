@@ -198,6 +198,7 @@ class Diagnosis(Result):
     visibility: Tuple[Record, ...]
     missing_columns: Tuple[Record, ...]
     not_possible: Tuple[Record, ...]
+    at_bound: Tuple[Record, ...]
     next_experiment: Tuple[Record, ...]
     data: Record
     notes: Tuple[str, ...]

@@ -2,6 +2,7 @@
 
 import math
 import numbers
+import os
 
 import numpy
 
@@ -265,7 +266,8 @@ def machine(step, *, states, noise, parameters, effects={}, may_vary=(), sensor=
                 the place, a state or a label
     sensor      state -> sd of its error, or (sd, correlation between neighbouring rows, -0.5 to 0.5); None for an sd that
                 is fitted. States that are not named are not measured; without any, all are, with an sd that is fitted
-    launch      state -> (mean, sd) of a trial's first value, where its first row lacks it
+    launch      state -> (mean, sd) of a trial's first value: a first row that has it is held against it (effects
+                launch_STATE and launch_spread_STATE), and one that lacks it begins there
     inputs      names of recorded numbers that a step takes, by the row it starts from
     most_wild   largest share of rows that may say nothing (missed events, bad tracks), 0 to 0.2
     """
@@ -278,7 +280,7 @@ def runs(machine, data=None, *, outcome=None, labels=(), inputs=None, **columns)
 
     machine   of machine()
     data      anything with columns, a pandas.DataFrame or a dict of arrays: columns are looked for there where they are
-              not given by name
+              not given by name; or an experiment folder whose experiment.toml states model = "none"
     columns   trial, and every state that the machine's sensor measures (NaN: missing); optionally condition, phase (which
               leg, which half of the cycle: it belongs to the step that starts from the row), time_s by one clock for all
               trials, position_m
@@ -289,4 +291,9 @@ def runs(machine, data=None, *, outcome=None, labels=(), inputs=None, **columns)
     """
     if not isinstance(machine, Machine):
         raise TypeError(f"runs: a Machine expected first, not {type(machine).__name__}")
+    if isinstance(data, (str, os.PathLike)):
+        if columns or outcome is not None or inputs or isinstance(labels, dict):
+            raise InputError("runs: a folder holds all columns, inputs and outcomes; only names of labels go with it")
+        read = _metastable.read_runs(machine._fields(), os.fspath(data), list(_words(labels, "labels")))
+        return Runs(machine, read["columns"], {}, read["outcome"], read["labels"], read["inputs"])
     return Runs(machine, data, columns, outcome, labels, inputs)

@@ -66,6 +66,61 @@ double exact_log_density(const MachineTrial& trial, double a, double b, double s
          0.5 * static_cast<double>(m) * std::log(2 * std::numbers::pi);
 }
 
+// The log density of all rows of a trial whose first state comes from N(mean, sd^2).
+double exact_with_launch(const MachineTrial& trial, const MachineLaunch& launch, double error, double correlation) {
+  const auto n = static_cast<Eigen::Index>(trial.rows.size());
+  Eigen::MatrixXd covariance(n, n);
+  Eigen::VectorXd off(n);
+  std::vector<double> mean{launch.mean}, variance{launch.sd * launch.sd};
+  for (Eigen::Index k = 1; k < n; ++k) {
+    mean.push_back(0.8 * mean.back() + 0.3);
+    variance.push_back(0.64 * variance.back() + 0.04);
+  }
+  for (Eigen::Index i = 0; i < n; ++i) {
+    off[i] = trial.rows[static_cast<std::size_t>(i)].seen[0] - mean[static_cast<std::size_t>(i)];
+    for (Eigen::Index j = 0; j <= i; ++j) {
+      const double shared = i == j ? 1 : i == j + 1 ? correlation : 0;
+      covariance(i, j) = covariance(j, i) =
+          std::pow(0.8, static_cast<double>(i - j)) * variance[static_cast<std::size_t>(j)] + shared * error * error;
+    }
+  }
+  const Eigen::LLT<Eigen::MatrixXd> root(covariance);
+  const Eigen::VectorXd white = root.matrixL().solve(off);
+  return -0.5 * white.squaredNorm() - root.matrixL().toDenseMatrix().diagonal().array().log().sum() -
+         0.5 * static_cast<double>(n) * std::log(2 * std::numbers::pi);
+}
+
+TEST(MachineFilter, AStatedLaunchIsPartOfTheExactLikelihood) {
+  for (const double correlation : {0.0, -0.5, 0.3})
+    for (const double sd : {0.0, 0.02, 0.3}) {
+      Machine machine = linear_machine(0.1, correlation);
+      machine.launches = {{"x", 1.0, sd}};
+      const MachineRuns runs =
+          scalar_runs(5, 12, 1.0, 0.1, 3, [](double x, double z, std::size_t) { return 0.8 * x + 0.3 + 0.2 * z; });
+      MachineHypothesis h = nominal_of(machine);
+      double exact = 0;
+      for (const MachineTrial& trial : runs.trials)
+        exact += exact_with_launch(trial, machine.launches[0], 0.1, correlation);
+      EXPECT_NEAR(followed(machine, runs, h).total(), exact, 1e-9 * std::abs(exact)) << correlation << ' ' << sd;
+      h.launch_offset = {0.4};
+      h.launch_scatter = {0.2};
+      exact = 0;
+      for (const MachineTrial& trial : runs.trials)
+        exact += exact_with_launch(trial, {"x", 1.4, std::hypot(sd, 0.2)}, 0.1, correlation);
+      EXPECT_NEAR(followed(machine, runs, h).total(), exact, 1e-9 * std::abs(exact)) << correlation << ' ' << sd;
+    }
+}
+
+// A launch that nobody stated fills in what a first row lacks, and says nothing where the row has the value.
+TEST(MachineFilter, AnAssumedLaunchIsNoEvidence) {
+  Machine machine = linear_machine(0.1);
+  const MachineRuns runs =
+      scalar_runs(5, 12, 1.0, 0.1, 3, [](double x, double z, std::size_t) { return 0.8 * x + 0.3 + 0.2 * z; });
+  const double without = followed(machine, runs, nominal_of(machine)).total();
+  machine.launches = {{"x", 7, 0.1, true}};
+  EXPECT_EQ(followed(machine, runs, nominal_of(machine)).total(), without);
+}
+
 TEST(MachineFilter, IsTheExactLikelihoodOfALinearMachine) {
   for (const double correlation : {0.0, -0.5, 0.3}) {
     const Machine machine = linear_machine(0.1, correlation);

@@ -62,6 +62,16 @@ TEST_F(LookedOver, LaunchesThatAreNotThoseStatedAreNoted) {
   EXPECT_EQ(said(), "");
 }
 
+TEST_F(LookedOver, ALabelThatNamesTwoMachinesIsRefused) {
+  runs_.labels = {{"machine", {"old", "new"}}};
+  for (std::size_t t = 0; t < runs_.trials.size(); ++t)
+    for (MachineRow& row : runs_.trials[t].rows) row.labels = {t < 7 ? 0 : 1};
+  EXPECT_EQ(message_of<std::invalid_argument>([&] { said(); }),
+            "machine: trial 1 is of old and trial 8 of new: give each machine runs of its own");
+  runs_.labels[0].name = "crew";
+  EXPECT_EQ(said(), "");
+}
+
 TEST_F(LookedOver, OneTrialInDegreesIsSuspected) {
   scale(&MachineRow::seen, 180 / std::numbers::pi, 4, 5);
   EXPECT_NE(said().find("x: its values in trial 5 are "), std::string::npos) << said();

@@ -135,11 +135,71 @@ TEST_F(WalkFolder, AWalkersEffectsAreThoseThatItsWalksMayHave) {
   };
   std::set<std::string> lacks;
   std::ranges::set_difference(ids(Walker::compass), ids(Walker::simplest), std::inserter(lacks, lacks.end()));
-  EXPECT_EQ(lacks, (std::set<std::string>{"leg_length", "leg_mass", "sensor_bias_swing_rate_rad_s",
-                                          "sensor_noise_swing_rate_rad_s"}));
+  EXPECT_EQ(lacks,
+            (std::set<std::string>{"launch_spread_swing_rate_rad_s", "launch_swing_rate_rad_s", "leg_length",
+                                   "leg_mass", "sensor_bias_swing_rate_rad_s", "sensor_noise_swing_rate_rad_s"}));
   EXPECT_EQ(ids(Walker::compass).size(), dynamics::walker_effects().size());
   EXPECT_EQ(effects_known_to(Walker::simplest).front().parameters.front().upper, 2) << "its own bounds of hip_damping";
   EXPECT_EQ(effects_known_to(Walker::simplest).front().parameters.front().unit, "");
+}
+
+TEST_F(WalkFolder, StatesWhereWalksBeginWhateverAnEffectDoesToThem) {
+  const WalkFiles plain = drawn(), moved = drawn({{"launch_half_angle_rad.offset", 0.01}});
+  EXPECT_EQ(moved.experiment_toml, plain.experiment_toml);
+  write(moved);
+  const Walks walks = *read_walks(folder_);
+  const MachineLaunch* stated = walks.machine->stated_launch("half_angle_rad");
+  ASSERT_NE(stated, nullptr);
+  EXPECT_EQ(stated->sd, 0);
+  for (const MachineTrial& trial : walks.runs.trials)
+    EXPECT_NEAR(trial.rows.front().seen[0], stated->mean + 0.01, 5 * 0.0005);
+  EXPECT_NE(message_of<std::invalid_argument>([] {
+              drawn({{"launch_half_angle_rad.offset", 0.2}});
+            }).find("--effect: launch_half_angle_rad.offset: 0.2 is outside [-0.1, 0.1]"),
+            std::string::npos);
+}
+
+TEST_F(WalkFolder, ALaunchIsReadAndItsDefectsAreNamed) {
+  WalkFiles files = drawn();
+  const std::size_t at = files.experiment_toml.find("[launch]");
+  ASSERT_NE(at, std::string::npos);
+  const std::string before = files.experiment_toml.substr(0, at);
+  const auto with = [&](const std::string& launch) {
+    files.experiment_toml = before + launch;
+    write(files);
+  };
+  with("");
+  EXPECT_EQ(read_walks(folder_)->machine->stated_launch("half_angle_rad"), nullptr);
+  with("[launch]\nstance_rate_rad_s = { mean = -1.1, sd = 0.02 }\n");
+  const Walks walks = *read_walks(folder_);
+  EXPECT_EQ(walks.machine->stated_launch("stance_rate_rad_s")->sd, 0.02);
+  EXPECT_EQ(walks.machine->stated_launch("half_angle_rad"), nullptr) << "the gait's is assumed";
+  with("[launch]\nstance_rate_rad_s = { mean = -1.1, sd = -0.02 }\n");
+  EXPECT_NE(refused().find("launch.stance_rate_rad_s.sd: -0.02 is outside [0, 30]"), std::string::npos) << refused();
+  with("[launch]\nstance_rate = { mean = -1.1, sd = 0.02 }\n");
+  EXPECT_NE(refused().find("unknown key 'stance_rate' in launch"), std::string::npos) << refused();
+}
+
+// Catalogues are short here, so that a diagnosis takes a second; all launches are 0.05 rad/s off.
+TEST_F(WalkFolder, LaunchesThatAreNotThoseStatedAreNamed) {
+  for (const std::uint64_t seed : {1U, 2U}) {
+    WalkOptions options;
+    options.trials = 12;
+    options.longest = 8;
+    options.seed = seed;
+    WalkerSetting setting{Walker::compass, 3, 0.3, dynamics::Terrain::fresh};
+    write(draw_walks(setting, {{"launch_stance_rate_rad_s.offset", 0.05}}, options, "drawn"));
+    DiagnosisOptions study;
+    study.catalogue = {"launch_stance_rate_rad_s", "launch_half_angle_rad", "impact_loss",
+                       "sensor_bias_stance_rate_rad_s"};
+    const Diagnosis d = diagnose_walks(*read_walks(folder_), study);
+    ASSERT_FALSE(d.causes.at_work.empty());
+    EXPECT_EQ(d.causes.at_work[0].name, "launch_stance_rate_rad_s");
+    EXPECT_GT(d.causes.at_work[0].probability, 0.8);
+    const EstimatedParameter& offset = d.causes.at_work[0].parameters[0];
+    EXPECT_NEAR(offset.value, 0.05, 0.01);
+    EXPECT_LT(offset.upper - offset.lower, 0.02);
+  }
 }
 
 TEST_F(WalkFolder, EffectsThatTheMachineLacksAreRefused) {

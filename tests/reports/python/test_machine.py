@@ -1,5 +1,7 @@
 """A simulator of one's own with logs of the real machine: the gap, its cause, and what is refused."""
 
+import os
+import tempfile
 import unittest
 
 import numpy as np
@@ -262,6 +264,46 @@ class Refused(unittest.TestCase):
         runs = metastable.runs(machine, **swung(trials=5))
         self.check("catalogue: 'dry_frction' is none of dry_friction", lambda: metastable.diagnose(runs, machine, catalogue="dry_frction"))
         self.check("did you mean 'dry_friction'?", lambda: metastable.diagnose(runs, machine, catalogue=["decay_drift+dry_frction"]))
+
+
+class Folder(unittest.TestCase):
+    """A folder whose experiment.toml states model = "none" holds what runs() else gets as columns."""
+
+    def setUp(self):
+        self.folder = tempfile.TemporaryDirectory()
+        self.addCleanup(self.folder.cleanup)
+
+    def put(self, name, text):
+        with open(os.path.join(self.folder.name, name), "w") as file:
+            file.write(text)
+
+    def test_gives_the_answer_of_its_columns(self):
+        data = swung(loss=0.004, trials=12, swings=12)
+        self.put("experiment.toml", 'system = "machine"\n[machine]\nmodel = "none"\nlabels = ["crew"]\n')
+        rows, number = ["trial,step,swing_rad,crew"], {}
+        for trial, swing in zip(data["trial"], data["swing_rad"]):
+            number[trial] = number.get(trial, 0) + 1
+            rows.append(f"{trial + 1},{number[trial]},{float(swing)!r},{'day' if trial % 2 else 'night'}")
+        self.put("steps.csv", "\n".join(rows) + "\n")
+        self.put("trials.csv", "trial,outcome\n" + "".join(f"{t + 1},stopped\n" for t in range(12)))
+        machine = pendulum()
+        crew = ["day" if trial % 2 else "night" for trial in data["trial"]]
+        given = metastable.runs(machine, trial=data["trial"] + 1, swing_rad=data["swing_rad"], labels={"crew": crew},
+                                outcome=["stopped"] * 12)
+        read = metastable.runs(machine, self.folder.name)
+        self.assertEqual(repr(read), repr(given))
+        catalogue = ["dry_friction", "quadratic_drag", "decay_by_crew"]
+        one, other = (metastable.diagnose(runs, machine, catalogue=catalogue) for runs in (read, given))
+        self.assertEqual(one.verdict, other.verdict)
+        self.assertEqual(str(one.at_work), str(other.at_work))
+
+    def test_another_machines_is_refused(self):
+        self.put("experiment.toml", 'system = "machine"\n[machine]\nmodel = "compass"\n')
+        self.put("steps.csv", "trial,step,swing_rad\n1,1,0.5\n")
+        with self.assertRaisesRegex(metastable.InputError, 'machine.model: "none" is expected'):
+            metastable.runs(pendulum(), self.folder.name)
+        with self.assertRaisesRegex(metastable.InputError, "a folder holds all columns"):
+            metastable.runs(pendulum(), self.folder.name, trial=[1])
 
 
 if __name__ == "__main__":

@@ -1,0 +1,72 @@
+#include "analysis/diagnosis/at_bound.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+
+namespace metastable::analysis {
+namespace {
+
+constexpr double at_the_end = 1e-6;  // of the range
+constexpr double inwards = 1e-3;     // of the range, to find the reported number that a parameter moves
+
+enum class End { none, lower, upper };
+
+End end_of(double value, double lower, double upper) {
+  const double near = at_the_end * (upper - lower);
+  if (!std::isfinite(near) || !(upper > lower)) return End::none;
+  return value <= lower + near ? End::lower : value >= upper - near ? End::upper : End::none;
+}
+
+// Finds the reported number that moves most, relative to itself, from one list to the other.
+NamedValue most_moved(const std::vector<NamedValue>& here, const std::vector<NamedValue>& there) {
+  std::size_t most = 0;
+  double largest = -1;
+  for (std::size_t k = 0; k < here.size(); ++k) {
+    const double moved = std::abs(there[k].second - here[k].second) / std::max(1e-300, std::abs(here[k].second));
+    if (moved > largest) most = k, largest = moved;
+  }
+  return here[most];
+}
+
+AtBound told(const std::string& of, const NamedValue& number, End end) {
+  return {of, number.first, end == End::upper, number.second};
+}
+
+}  // namespace
+
+std::vector<AtBound> values_at_bound(const TransitionModel& model, const Fit& fit) {
+  std::vector<AtBound> all;
+  for (const EffectTerm& term : fit.terms) {
+    const std::vector<NamedValue> here = term.candidate->report(term.variant, term.values);
+    for (std::size_t p = 0; p < term.values.size(); ++p) {
+      const FreeParameter& free = term.candidate->parameters[p];
+      const double range = free.upper - free.lower;
+      const End end = end_of(term.values[p], free.lower, free.upper);
+      if (end == End::none || std::abs(term.values[p] - free.neutral) <= at_the_end * range) continue;
+      std::vector<double> moved = term.values;
+      moved[p] += (end == End::lower ? 1 : -1) * inwards * range;
+      all.push_back(told(term.candidate->id, most_moved(here, term.candidate->report(term.variant, moved)), end));
+    }
+  }
+  const std::vector<NamedValue> here = model.report_nuisances(fit.nuisance);
+  for (std::size_t p = 0; p < fit.nuisance.size(); ++p) {
+    const Nuisance& n = model.nuisances()[p];
+    const End end = end_of(fit.nuisance[p], n.lower, n.upper);
+    if (end == End::none || (end == End::lower && n.name.starts_with("log"))) continue;
+    std::vector<double> moved = fit.nuisance;
+    moved[p] += (end == End::lower ? 1 : -1) * inwards * (n.upper - n.lower);
+    all.push_back(told("", most_moved(here, model.report_nuisances(moved)), end));
+  }
+  return all;
+}
+
+std::string at_bound_in_words(const AtBound& one) {
+  return fmt::format(
+      "{}{} stands at the {} bound of its range, {:.4g}: its interval has one side only, and the truth may lie beyond.",
+      one.of.empty() ? "The fitted " : "The " + one.of + "'s ", one.parameter, one.upper ? "upper" : "lower",
+      one.value);
+}
+
+}  // namespace metastable::analysis

@@ -1,0 +1,261 @@
+#include "analysis/gap/trial_groups.h"
+
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+
+#include <Eigen/QR>
+#include <algorithm>
+#include <cmath>
+#include <functional>
+#include <map>
+#include <numbers>
+#include <set>
+#include <utility>
+
+#include "analysis/fitting/rules.h"
+#include "analysis/statistics/median.h"
+#include "analysis/statistics/random.h"
+#include "dynamics/numerics/truncated_normal.h"
+
+namespace metastable::analysis {
+namespace {
+
+constexpr std::size_t fewest_in_group = 3;
+constexpr double least_share = 0.1;    // of the trials, in the smaller group
+constexpr int split_draws = 2000;      // for the chance level of one split
+constexpr int counted_draws = 60;      // beyond which its tail follows an exponential law
+constexpr double poor_share = 0.1;     // of the usual information of a step: a trial says next to nothing
+constexpr double most_poor = 0.1;      // share of the trials that may say so little
+constexpr double one_sided = 0.8;      // of all scores along what changes their spread, not their mean
+constexpr double least_apart = 3;      // sds of a trial: groups that overlap more are none
+constexpr std::size_t most_named = 5;  // trials in the sentence
+constexpr double least_weight = 1e-12;
+constexpr int drift_degree = 3;                 // of a polynomial that a break is held against
+constexpr std::size_t fewest_for_a_break = 12;  // trials
+
+struct HeapSums {
+  double weight = 0, first = 0, second = 0;
+  void add(const TrialValue& one, double sign = 1) {
+    weight += sign * one.weight;
+    first += sign * one.weight * one.value;
+    second += sign * one.weight * one.value * one.value;
+  }
+  double mean() const { return first / weight; }
+  double squares() const { return std::max(0.0, second - first * first / weight); }
+};
+
+std::size_t fewest_of(std::size_t trials) {
+  return std::max(fewest_in_group, static_cast<std::size_t>(std::ceil(least_share * static_cast<double>(trials))));
+}
+
+// Returns [trials] what the scores say of a parameter by itself, in the trials whose steps tell of it; nothing where
+// many trials do not, as of what depends on their order, and of what changes the spread of scores. Steps weigh alike:
+// trials far off the model have another information, and few of them must not stand for all.
+// @param change  [events] of the score with the parameter
+std::vector<TrialValue> trial_values(const TransitionModel& model, const Eigen::VectorXd& change,
+                                     const std::vector<double>& score) {
+  std::vector<double> along(model.trials()), weight(model.trials()), events(model.trials());
+  double sum = 0, sizes = 0;
+  for (std::size_t e = 0; e < model.events().size(); ++e) {
+    const Event& event = model.events()[e];
+    if (event.kind == EventKind::launch) continue;
+    const double c = change[static_cast<Eigen::Index>(e)];
+    along[event.trial] += c * score[e];
+    sum += c * score[e];
+    sizes += std::abs(c * score[e]);
+    weight[event.trial] += c * c;
+    ++events[event.trial];
+  }
+  std::vector<double> rates;
+  for (std::size_t t = 0; t < weight.size(); ++t)
+    if (events[t] > 0) rates.push_back(weight[t] / events[t]);
+  if (rates.empty() || std::abs(sum) > one_sided * sizes) return {};
+  const double usual = median(rates);
+  const auto poor = std::ranges::count_if(rates, [&](double rate) { return !(rate > poor_share * usual); });
+  if (!(usual > least_weight) || static_cast<double>(poor) > most_poor * static_cast<double>(rates.size())) return {};
+  std::vector<TrialValue> values;
+  for (std::size_t t = 0; t < weight.size(); ++t)
+    if (events[t] > 0 && weight[t] > poor_share * usual * events[t])
+      values.push_back({t, along[t] / weight[t], usual * events[t]});
+  return values;
+}
+
+// Says whether trials of one condition are all in one group, for every condition.
+bool follow_conditions(const TransitionModel& model, const TwoGroups& groups) {
+  if (model.conditions() < 2) return false;
+  const std::set<std::size_t> fewer(groups.fewer.begin(), groups.fewer.end());
+  std::map<std::size_t, std::set<bool>> sides;
+  for (const Event& event : model.events()) sides[event.condition].insert(fewer.contains(event.trial));
+  return std::ranges::all_of(sides, [](const auto& one) { return one.second.size() == 1; });
+}
+
+// Says whether an effect is that trials differ from each other.
+bool is_spread(const std::string& id) { return id.find("_spread") != std::string::npos; }
+
+// Returns the scores under a hypothesis without what it says of a spread between trials: two groups pass for one.
+Evaluation without_spreads(const TransitionModel& model, const Fit& chosen) {
+  std::vector<EffectTerm> terms;
+  for (const EffectTerm& term : chosen.terms)
+    if (!is_spread(term.candidate->id)) terms.push_back(term);
+  return terms.size() == chosen.terms.size() ? chosen.evaluation : model.evaluate(chosen.nuisance, terms);
+}
+
+// A parameter along which trials may lie apart.
+struct Direction {
+  std::string name;
+  Eigen::VectorXd change;
+};
+
+std::vector<Direction> directions(const TransitionModel& model, const EffectScan& scan, const Fit& recalibrated) {
+  std::vector<Direction> all;
+  const Eigen::MatrixXd& held = recalibrated.derivatives.change;
+  for (Eigen::Index p = 0; p < std::min(held.cols(), static_cast<Eigen::Index>(model.nuisances().size())); ++p)
+    all.push_back({model.nuisances()[static_cast<std::size_t>(p)].name, held.col(p)});
+  for (const ScannedEffect& effect : scan.effects)
+    for (Eigen::Index p = 0; p < effect.columns.change.cols(); ++p)
+      if (!is_spread(effect.candidate->id)) all.push_back({effect.candidate->id, effect.columns.change.col(p)});
+  return all;
+}
+
+// Returns the sum of squares that a polynomial in the order of trials leaves.
+double left_by_a_drift(const std::vector<TrialValue>& values) {
+  const auto n = static_cast<Eigen::Index>(values.size());
+  Eigen::MatrixXd basis(n, drift_degree + 1);
+  Eigen::VectorXd y(n);
+  for (Eigen::Index i = 0; i < n; ++i) {
+    const TrialValue& one = values[static_cast<std::size_t>(i)];
+    const double root = std::sqrt(one.weight), at = 2 * (static_cast<double>(i) + 0.5) / static_cast<double>(n) - 1;
+    for (int power = 0; power <= drift_degree; ++power) basis(i, power) = root * std::pow(at, power);
+    y[i] = root * one.value;
+  }
+  return (y - basis * basis.householderQr().solve(y)).squaredNorm();
+}
+
+// Returns how often values drawn trial by trial gain as much.
+// @param value  of a uniform number  @param groups  of the values: their gain counts
+template <class Value, class Groups>
+double by_chance(double gain, std::size_t trials, std::uint64_t seed, Value value, Groups groups) {
+  std::vector<double> gains;
+  for (std::uint64_t draw = 0; draw < split_draws; ++draw) {
+    std::vector<TrialValue> values;
+    for (std::size_t t = 0; t < trials; ++t)
+      values.push_back({t, value(uniform_at(seed, draw, t, static_cast<std::uint64_t>(DrawStream::trial_groups))), 1});
+    const std::optional<TwoGroups> found = groups(std::move(values));
+    gains.push_back(found ? found->gain : 0);
+  }
+  std::ranges::sort(gains, std::greater<>());
+  const double edge = gains[counted_draws];
+  if (gain <= edge)
+    return static_cast<double>(std::ranges::count_if(gains, [&](double g) { return g >= gain; })) / split_draws;
+  double excess = 0;
+  for (int i = 0; i < counted_draws; ++i) excess += (gains[static_cast<std::size_t>(i)] - edge) / counted_draws;
+  return excess > 0 ? static_cast<double>(counted_draws) / split_draws * std::exp(-(gain - edge) / excess) : 0;
+}
+
+}  // namespace
+
+std::optional<TwoGroups> split(std::vector<TrialValue> values) {
+  const std::size_t n = values.size(), fewest = fewest_of(n);
+  if (n < 2 * fewest) return {};
+  std::ranges::sort(values, {}, &TrialValue::value);
+  HeapSums all, below, above;
+  for (const TrialValue& one : values) all.add(one);
+  above = all;
+  std::size_t best = 0;
+  double within = all.squares(), gap = 0;
+  for (std::size_t k = 1; k <= n - fewest; ++k) {
+    below.add(values[k - 1]);
+    above.add(values[k - 1], -1);
+    const double left = below.squares() + above.squares();
+    if (k < fewest || left >= within) continue;
+    best = k;
+    within = left;
+    gap = above.mean() - below.mean();
+  }
+  if (best == 0 || !(within > 0)) return {};
+  TwoGroups groups;
+  groups.sorted = n;
+  groups.within = within;
+  groups.gain = static_cast<double>(n) * std::log(all.squares() / within);
+  groups.apart = gap / std::sqrt(within / all.weight);
+  const bool few_above = 2 * best >= n;
+  for (std::size_t i = few_above ? best : 0; i < (few_above ? n : best); ++i) groups.fewer.push_back(values[i].trial);
+  std::ranges::sort(groups.fewer);
+  return groups;
+}
+
+std::optional<TwoGroups> broken(const std::vector<TrialValue>& values) {
+  const std::size_t n = values.size(), fewest = fewest_of(n);
+  if (n < std::max<std::size_t>(2 * fewest, fewest_for_a_break)) return {};
+  HeapSums below, above;
+  for (const TrialValue& one : values) above.add(one);
+  const double all = above.weight;
+  std::size_t best = 0;
+  TwoGroups groups;
+  for (std::size_t k = 1; k <= n - fewest; ++k) {
+    below.add(values[k - 1]);
+    above.add(values[k - 1], -1);
+    const double left = below.squares() + above.squares();
+    if (k < fewest || (best > 0 && left >= groups.within)) continue;
+    best = k;
+    groups.within = left;
+    groups.apart = std::abs(above.mean() - below.mean()) / std::sqrt(left / all);
+  }
+  if (!(groups.within > 0)) return {};
+  groups.sorted = n;
+  groups.gain = static_cast<double>(n) * std::log(left_by_a_drift(values) / groups.within);
+  const bool few_after = 2 * best >= n;
+  for (std::size_t i = few_after ? best : 0; i < (few_after ? n : best); ++i) groups.fewer.push_back(values[i].trial);
+  return groups;
+}
+
+double split_p_value(double gain, std::size_t trials, std::uint64_t seed) {
+  return by_chance(
+      gain, trials, seed, [](double u) { return std::sin(2 * std::numbers::pi * u); },
+      [](std::vector<TrialValue> values) { return split(std::move(values)); });
+}
+
+double break_p_value(double gain, std::size_t trials, std::uint64_t seed) {
+  return by_chance(gain, trials, seed, dynamics::normal_quantile,
+                   [](const std::vector<TrialValue>& values) { return broken(values); });
+}
+
+std::optional<TrialGroups> trial_groups(const TransitionModel& model, const EffectScan& scan, const Fit& recalibrated,
+                                        const Fit& chosen, std::uint64_t seed) {
+  const std::vector<Direction> all = directions(model, scan, recalibrated);
+  for (const bool in_order : {false, true}) {
+    const Direction* along = nullptr;
+    TwoGroups most;
+    for (const Direction& one : all) {
+      std::vector<TrialValue> values = trial_values(model, one.change, recalibrated.evaluation.score);
+      std::optional<TwoGroups> groups = in_order ? broken(values) : split(std::move(values));
+      if (!groups || (along && groups->gain <= most.gain) || follow_conditions(model, *groups)) continue;
+      along = &one;
+      most = *std::move(groups);
+    }
+    if (!along || !(most.gain > 0) || most.apart < least_apart) continue;
+    const double p = (in_order ? break_p_value : split_p_value)(most.gain, most.sorted, seed);
+    if (!(p * static_cast<double>(all.size()) < Rules::two_machines_level / 2)) continue;
+    if (&chosen != &recalibrated) {
+      HeapSums left;
+      for (const TrialValue& one : trial_values(model, along->change, without_spreads(model, chosen).score))
+        left.add(one);
+      if (left.weight > 0 && most.within > Rules::most_left_by_groups * left.squares()) continue;
+    }
+    return TrialGroups{along->name, std::move(most), in_order};
+  }
+  return {};
+}
+
+std::string trial_groups_in_words(const TransitionModel& model, const TrialGroups& found) {
+  const std::vector<std::size_t>& fewer = found.groups.fewer;
+  std::vector<std::string> names;
+  for (std::size_t i = 0; i < std::min(most_named, fewer.size()); ++i) names.push_back(model.trial_name(fewer[i]));
+  return fmt::format(
+      "the trials fall into two groups{} that one set of parameters does not hold: {} of {} (trials {}{}) lie {:.2g} "
+      "sds of a trial from the others along {}: are these the trials of two machines, or of one that was changed?",
+      found.in_order ? ", one after the other," : "", fewer.size(), found.groups.sorted, fmt::join(names, ", "),
+      fewer.size() > most_named ? ", ..." : "", found.groups.apart, found.along);
+}
+
+}  // namespace metastable::analysis

@@ -1,0 +1,29 @@
+#pragma once
+// Reads steps.csv and trials.csv: the rows of any machine's trials, and how these ended.
+
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "analysis/experiment/csv_reader.h"
+#include "analysis/experiment/experiment.h"
+#include "analysis/experiment/input_error.h"
+#include "analysis/machine_model/machine_runs.h"
+
+namespace metastable::analysis {
+
+/// The columns of steps.csv beside condition, trial, step, phase, time_s and position_m.
+struct StepColumns {
+  std::vector<std::pair<std::string, dynamics::Range>> states;  ///< measured, each with the range of its values
+  std::vector<std::string> labels = {}, inputs = {};
+  bool legs = false;          ///< phases are legs, 1 and 2; else any words
+  bool leg_is_input = false;  ///< the leg is an input of the step
+};
+
+/// Checks names and types of the columns, steps of a trial in order without gap, trials that stand together, and
+/// outcomes of those trials only. Values of labels and phases have the order in which they come. What is wrong goes to
+/// `defects`, each with file, line and column.
+/// @param source  with the texts of both files; trials.csv may be missing
+void read_steps(const ExperimentSource& source, const StepColumns& columns, MachineRuns& runs, Defects& defects);
+
+}  // namespace metastable::analysis
