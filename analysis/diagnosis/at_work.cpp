@@ -65,21 +65,33 @@ std::vector<EstimatedParameter> averaged(const std::vector<Cause>& ranked, const
   return mean;
 }
 
+bool of_one_group(const std::vector<EffectGroup>& groups, const std::string& effect, const std::string& other) {
+  return std::ranges::any_of(groups, [&](const EffectGroup& group) {
+    return std::ranges::find(group.members, effect) != group.members.end() &&
+           std::ranges::find(group.members, other) != group.members.end();
+  });
+}
+
+// Returns the probability that one of these effects is at work.
+double probability_of(const std::vector<std::string>& effects, const Probabilities& probabilities,
+                      const Odds& unnamed) {
+  double share = 0;
+  for (const Cause& cause : probabilities.ranked)
+    if (std::ranges::any_of(effects, [&](const std::string& id) { return holds(cause, id); }))
+      share += cause.probability / probabilities.of_effects();
+  return probabilities.of_gap() * share * unnamed.of_catalogue();
+}
+
 }  // namespace
 
 std::vector<AtWork> list_at_work(const Probabilities& probabilities, const Odds& unnamed,
                                  const std::vector<std::string>& alike, const std::vector<EffectGroup>& groups,
                                  const Rules& rules) {
   const std::vector<Cause>& ranked = probabilities.ranked;
-  const double sum = probabilities.of_effects();
   std::vector<AtWork> all;
-  if (!(sum > 0)) return all;
+  if (!(probabilities.of_effects() > 0)) return all;
   const auto probability = [&](const std::vector<std::string>& effects) {
-    double share = 0;
-    for (const Cause& cause : ranked)
-      if (std::ranges::any_of(effects, [&](const std::string& id) { return holds(cause, id); }))
-        share += cause.probability / sum;
-    return probabilities.of_gap() * share * unnamed.of_catalogue();
+    return probability_of(effects, probabilities, unnamed);
   };
   // Effects of the first hypothesis, each with what stands in its place in those that are alike to it.
   std::vector<std::string> listed;
@@ -87,9 +99,12 @@ std::vector<AtWork> list_at_work(const Probabilities& probabilities, const Odds&
     AtWork one{effect, {effect}, probability({effect}), averaged(ranked, effect), {}, {}, {}};
     if (one.probability < rules.least_at_work) {
       for (const Cause& cause : ranked) {
-        if (std::ranges::find(alike, cause.name()) == alike.end() || holds(cause, effect)) continue;
+        if (holds(cause, effect)) continue;
+        const bool acts_alike = std::ranges::find(alike, cause.name()) != alike.end();
+        if (!acts_alike && probability(one.effects) >= rules.least_at_work) break;
         for (const std::string& other : cause.effects)
-          if (!holds(ranked.front(), other) && std::ranges::find(one.effects, other) == one.effects.end())
+          if (!holds(ranked.front(), other) && (acts_alike || of_one_group(groups, effect, other)) &&
+              std::ranges::find(one.effects, other) == one.effects.end())
             one.effects.push_back(other);
       }
       if (one.effects.size() > 1) {
@@ -109,6 +124,30 @@ std::vector<AtWork> list_at_work(const Probabilities& probabilities, const Odds&
     }
   std::ranges::stable_sort(all, std::ranges::greater{}, &AtWork::probability);
   return all;
+}
+
+void join_rivals(std::vector<AtWork>& at_work, const Probabilities& probabilities, const Odds& unnamed,
+                 const std::vector<std::string>& set, const std::vector<EffectGroup>& groups, const Rules& rules) {
+  if (at_work.empty()) return;
+  AtWork group = at_work.front();
+  for (const Cause& cause : probabilities.ranked) {
+    if (group.probability >= rules.least_at_work) break;
+    if (std::ranges::find(set, cause.name()) == set.end() || cause.effects.empty() ||
+        std::ranges::any_of(group.effects, [&](const std::string& effect) { return holds(cause, effect); }))
+      continue;
+    group.effects.push_back(*std::ranges::max_element(cause.effects, {}, [&](const std::string& effect) {
+      return probability_of({effect}, probabilities, unnamed);
+    }));
+    group.probability = probability_of(group.effects, probabilities, unnamed);
+  }
+  if (group.probability < rules.least_at_work) return;
+  group.name = common_name(groups, group.effects);
+  std::erase_if(at_work, [&](const AtWork& one) {
+    return std::ranges::any_of(one.effects, [&](const std::string& effect) {
+      return std::ranges::find(group.effects, effect) != group.effects.end();
+    });
+  });
+  at_work.insert(at_work.begin(), std::move(group));
 }
 
 std::vector<UnnamedFacet> facets_by_probability(const Chosen& chosen, double p_unnamed, const Rules& rules) {

@@ -13,11 +13,17 @@ namespace metastable::analysis {
 
 /// Lists the effects of the likeliest hypotheses by their probability of being at work, each over all hypotheses that
 /// hold it, with or without something unnamed; where none of the effects that act alike is at work by itself they are
-/// one group.
+/// one group, and so are effects of one of `groups` that stand in each other's place.
 /// @param alike  Diagnosis::Causes::alike  @param groups  TransitionModel::groups()
 std::vector<AtWork> list_at_work(const Probabilities& probabilities, const Odds& unnamed,
                                  const std::vector<std::string>& alike, const std::vector<EffectGroup>& groups,
                                  const Rules& rules);
+
+/// Makes one group of the first effect and of those that hypotheses without it hold in its place, the likeliest first,
+/// until something of it is at work; where all of them are not enough, `at_work` stays as it is.
+/// @param at_work  list_at_work(), none at work  @param set  names of the hypotheses that explain the gap
+void join_rivals(std::vector<AtWork>& at_work, const Probabilities& probabilities, const Odds& unnamed,
+                 const std::vector<std::string>& set, const std::vector<EffectGroup>& groups, const Rules& rules);
 
 /// Lists the facets in which something without a name would act: beside the likeliest hypothesis of those it was
 /// supposed beside, or alone where that is likelier. They share `p_unnamed`.

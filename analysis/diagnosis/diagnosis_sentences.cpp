@@ -108,6 +108,16 @@ void say_what_is_at_work(std::vector<std::string>& s, const Diagnosis& d) {
   }
 }
 
+// Says what ignoring it does to the expected steps.
+void say_cost_of_ignoring(std::vector<std::string>& s, const Diagnosis& d) {
+  const std::optional<Estimate>& ratio = d.shrinkage.steps.without_unnamed;
+  if (!ratio || !std::isfinite(ratio->upper)) return;
+  const DecimalEstimate times = to_decimal(*ratio, NumberFormat::general, 2);
+  s.push_back(
+      fmt::format("A model without it takes {} times the {}s before failure that this machine takes (90 %: {} to {}).",
+                  plain_text(times.value), d.data.step_name, plain_text(times.lower), plain_text(times.upper)));
+}
+
 // Says how much of the gap stays without a name, and where.
 void say_what_stays(std::vector<std::string>& s, const Diagnosis& d) {
   std::string where;
@@ -121,6 +131,7 @@ void say_what_stays(std::vector<std::string>& s, const Diagnosis& d) {
   s.push_back(fmt::format("Something without a name stays{}, with probability {:.2f}.{}",
                           known ? fmt::format(", {} of the gap", percent(1 - *d.shrinkage.measures[0].closed)) : "",
                           d.causes.p_unnamed, where));
+  say_cost_of_ignoring(s, d);
 }
 
 double without_effect(const Diagnosis& d) { return d.causes.p_no_gap + d.causes.p_recalibrate; }
@@ -189,6 +200,7 @@ void say_unexplained(std::vector<std::string>& s, const Diagnosis& d) {
                               d.causes.ranked.front().name()));
   }
   say_unnamed(s, d);
+  say_cost_of_ignoring(s, d);
 }
 
 void say_verdict(std::vector<std::string>& s, const Diagnosis& d) {

@@ -95,6 +95,27 @@ double weighted_quantile(const std::vector<std::pair<double, double>>& sorted, d
 
 double error_at(int node) { return error_reach * (2.0 * node / (error_nodes - 1) - 1); }
 
+// Returns the weights of the nodes of a model's error, by the failures counted; their sum is one.
+std::array<double, error_nodes> error_weights(double steps, const ModelError& error, double at_risk, double rests) {
+  std::array<double, error_nodes> weight{};
+  double sum = 0;
+  for (int k = 0; k < error_nodes; ++k) {
+    const double z = error_at(k), expected = at_risk / (steps * std::exp(error.here * z));
+    // In units of the weight at no error, of which the exponent is within reach of any count.
+    const double gained = at_risk > 0 ? -rests * error.here * z - (expected - at_risk / steps) : 0;
+    weight[static_cast<std::size_t>(k)] = std::exp(std::min(600.0, gained - 0.5 * z * z));
+    sum += weight[static_cast<std::size_t>(k)];
+  }
+  for (double& one : weight) one /= sum;
+  return weight;
+}
+
+// Returns the median of weighed values with their 5 and 95 % quantiles.
+Estimate middle_of(std::vector<std::pair<double, double>> weighed) {
+  std::ranges::sort(weighed);
+  return {weighted_quantile(weighed, 0.5), weighted_quantile(weighed, 0.05), weighted_quantile(weighed, 0.95)};
+}
+
 // Says what of the gap the chosen model leaves, in the logarithm of the expected steps. A gap in nats is a square of
 // its size: of what the effect changes, as much may be wrong as the root of the share that stays. Where nothing says
 // how large that is, a factor of e.
@@ -168,31 +189,36 @@ Estimate joined_steps(const std::vector<double>& here, const std::vector<double>
       if (rests == 0) weighed.emplace_back(there[i], 2 * error_nodes);
       continue;
     }
-    std::array<double, error_nodes> weight{};
-    double sum = 0;
-    for (int k = 0; k < error_nodes; ++k) {
-      const double z = error_at(k), expected = at_risk / (here[i] * std::exp(error.here * z));
-      // In units of the weight at no error, of which the exponent is within reach of any count.
-      const double without = at_risk / here[i];
-      const double gained = at_risk > 0 ? -rests * error.here * z - (expected - without) : 0;
-      weight[static_cast<std::size_t>(k)] = std::exp(std::min(600.0, gained - 0.5 * z * z));
-      sum += weight[static_cast<std::size_t>(k)];
-    }
+    const std::array<double, error_nodes> weight = error_weights(here[i], error, at_risk, rests);
     // The error differs elsewhere by more, the more the model says is different there.
     const double further = std::isfinite(there[i]) ? error.elsewhere * std::abs(std::log(there[i] / here[i])) : 0;
     for (int k = 0; k < error_nodes; ++k)
       for (const double more : {-1.0, 1.0})
         for (const double place : {-1.2247, 0.0, 1.2247})  // three equal weights of mean 0 and variance 1
           weighed.emplace_back(there[i] * std::exp(error.here * error_at(k) + more * further + kernel * place),
-                               weight[static_cast<std::size_t>(k)] / sum * error_nodes / 3);
+                               weight[static_cast<std::size_t>(k)] * error_nodes / 3);
   }
   if (weighed.empty()) {  // every draw is refuted: the count alone is left
     StepsBeforeFailure counted;
     set_observed(counted, {at_risk, rests});
     return {counted.observed, counted.observed_lower, counted.observed_upper};
   }
-  std::ranges::sort(weighed);
-  return {weighted_quantile(weighed, 0.5), weighted_quantile(weighed, 0.05), weighted_quantile(weighed, 0.95)};
+  return middle_of(std::move(weighed));
+}
+
+Estimate steps_of_model_by_machine(const std::vector<double>& here, const ModelError& error, double at_risk,
+                                   double rests) {
+  std::vector<std::pair<double, double>> weighed;
+  for (const double steps : here) {
+    if (!std::isfinite(steps)) {  // the machine fails and the model never does
+      weighed.emplace_back(infinite, 1);
+      continue;
+    }
+    const std::array<double, error_nodes> weight = error_weights(steps, error, at_risk, rests);
+    for (int k = 0; k < error_nodes; ++k)
+      weighed.emplace_back(std::exp(-error.here * error_at(k)), weight[static_cast<std::size_t>(k)]);
+  }
+  return middle_of(std::move(weighed));
 }
 
 Estimate bounded_by_count(const Estimate& joined, const StepsBeforeFailure& counted) {
@@ -236,6 +262,9 @@ void add_machine_steps(Diagnosis& d, const TransitionModel& model, const Weighed
     if (std::isfinite(machine.steps.lower)) s.machine.push_back(std::move(machine));
   };
   add("", of_effects);
+  if (rests > 0 && (d.verdict == Verdict::partly_explained || d.verdict == Verdict::unexplained))
+    s.without_unnamed =
+        steps_of_model_by_machine(d.verdict == Verdict::unexplained ? of_plain : of_effects, error, at_risk, rests);
   if (elsewhere.second) add(elsewhere.first, draw(*elsewhere.second, fits.empty() ? plain : fits, draws_of_machine));
 }
 

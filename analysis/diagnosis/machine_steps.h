@@ -53,6 +53,11 @@ struct ModelError {
 Estimate joined_steps(const std::vector<double>& here, const std::vector<double>& there, const ModelError& error,
                       double at_risk, double rests);
 
+/// Returns what the steps of a model are, as a multiple of the machine's, by the same rule: what is known of the
+/// model's error once the machine's failures were counted. @param rests  > 0
+Estimate steps_of_model_by_machine(const std::vector<double>& here, const ModelError& error, double at_risk,
+                                   double rests);
+
 /// Returns the joined interval, or that of the count where it is the narrower one: a model that leaves more open than
 /// the rests do by themselves says nothing of them.
 /// @param counted  as set_observed() leaves it

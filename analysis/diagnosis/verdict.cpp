@@ -258,13 +258,14 @@ Named give_verdict(const Probabilities& probabilities, const Odds& unnamed, cons
   std::vector<std::string> set = set_of(probabilities, rules);
   std::vector<std::string> alike = set.empty() ? set : alike_of(set, probabilities.ranked, visible, rules);
   named.at_work = list_at_work(probabilities, unnamed, alike, data.groups, rules);
-  if (whole)
-    named.verdict = Verdict::explained;  // by one of the set, whichever it is
-  else if (std::ranges::any_of(named.at_work,
-                               [&](const AtWork& one) { return one.probability >= rules.least_at_work; }))
-    named.verdict = Verdict::partly_explained;
-  else
-    return named;
+  const auto any_at_work = [&] {
+    return std::ranges::any_of(named.at_work,
+                               [&](const AtWork& one) { return one.probability >= rules.least_at_work; });
+  };
+  if (whole && !any_at_work())  // one of the set explains it, whichever it is
+    join_rivals(named.at_work, probabilities, unnamed, set, data.groups, rules);
+  if (!any_at_work()) return named;
+  named.verdict = whole ? Verdict::explained : Verdict::partly_explained;
   named.set = std::move(set);
   named.alike = std::move(alike);
   return named;

@@ -16,7 +16,7 @@ struct Effort {
   std::size_t most_partners = 3;  ///< of one leader that are fitted
   int refinements = 3;            ///< of a variant, each with half the moves
   int most_iterations = FitOptions{}.most_iterations;
-  std::size_t most_effects = 4;  ///< of one hypothesis
+  std::size_t most_effects = 6;  ///< of one hypothesis
 };
 Effort effort_for(const TransitionModel& model, const Fit& recalibrated);
 

@@ -102,6 +102,30 @@ void add_pairs_within(const RankingProblem& problem, const SingleEffects& single
     if (pair.fitted()) pairs.push_back(std::move(pair));
 }
 
+// Fits what stays of a set of four and more without each of its effects, where that was not tried: an effect that led
+// the search there need not be one that is at work.
+void add_sets_within(const RankingProblem& problem, const SingleEffects& singles, const RankedCause& set,
+                     const std::vector<RankedCause>& pairs, std::vector<RankedCause>& sets) {
+  std::vector<RankedCause> found(set.terms.size());
+  problem.model.side_by_side(found.size(), problem.threads, [&](std::size_t without) {
+    std::vector<EffectTerm> terms = set.terms;
+    terms.erase(terms.begin() + static_cast<std::ptrdiff_t>(without));
+    if (find_set(sets, terms) != sets.end()) return;
+    problem.heartbeat();
+    found[without] =
+        as_cause(fit(problem.model, set.fit.nuisance, terms,
+                     {.count = {}, .refit_nuisances = true, .most_iterations = problem.effort.most_iterations}),
+                 problem.recalibrated);
+    found[without].together = gain_together(problem, singles, found[without]);
+  });
+  std::erase_if(found, [](const RankedCause& one) { return !one.fitted() || !std::isfinite(one.evidence); });
+  // A set is worth what it earns beyond a part of it; one of which no part was fitted is not weighed.
+  for (RankedCause& one : found) one.evidence = -std::numeric_limits<double>::infinity();
+  bound_by_parts(problem, singles, set.terms.size() == 4 ? pairs : sets, found);
+  std::erase_if(found, [](const RankedCause& one) { return !std::isfinite(one.evidence); });
+  std::ranges::move(found, std::back_inserter(sets));
+}
+
 // Returns the best hypotheses of a kind, the best one first; of those that gain the same and differ in one effect,
 // which act alike, one stands for all.
 std::vector<RankedCause> strongest_of(const std::vector<RankedCause>& all, std::size_t most, const Rules& rules) {
@@ -293,7 +317,10 @@ std::vector<RankedCause> rank_larger_sets(const RankingProblem& problem, const S
     bases = strongest_of(larger, 1, problem.rules);
     std::ranges::move(larger, std::back_inserter(sets));
     if (bases.empty() || bases.front().evidence < before) break;
-    if (bases.front().terms.size() == 3) add_pairs_within(problem, singles, bases.front(), pairs);
+    if (bases.front().terms.size() == 3)
+      add_pairs_within(problem, singles, bases.front(), pairs);
+    else
+      add_sets_within(problem, singles, bases.front(), pairs, sets);
   }
   if (const RankedCause* best = best_of(sets); best && best->evidence > pair_evidence)
     add_swaps(problem, singles, pairs, sets);

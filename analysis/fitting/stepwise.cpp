@@ -16,9 +16,10 @@ double parameters_of(const Fit& fit) {
   return count;
 }
 
-bool holds(const RankedCause& cause, const std::string& id) {
-  return std::any_of(cause.terms.begin(), cause.terms.end(),
-                     [&](const EffectTerm& term) { return term.candidate->id == id; });
+bool holds_all(const RankedCause& cause, const std::vector<std::string>& ids) {
+  return std::ranges::all_of(ids, [&](const std::string& id) {
+    return std::ranges::any_of(cause.terms, [&](const EffectTerm& term) { return term.candidate->id == id; });
+  });
 }
 
 }  // namespace
@@ -40,18 +41,19 @@ std::vector<StepwiseChoice> stepwise_selection(const TransitionModel& model, con
        {std::pair<const char*, decltype(&schwarz)>{"AICc", corrected_akaike}, {"BIC", schwarz}}) {
     StepwiseChoice& choice = choices.emplace_back(StepwiseChoice{name, {}});
     double best = criterion(recalibrated.log_likelihood, parameters_of(recalibrated), events);
-    for (const std::vector<RankedCause>* hypotheses : {&ranking.singles, &ranking.pairs}) {
+    for (std::size_t size = 1;; ++size) {
       const RankedCause* found = nullptr;
-      for (const RankedCause& cause : *hypotheses) {
-        if (cause.fit.nuisance.empty() || (!choice.effects.empty() && !holds(cause, choice.effects.front()))) continue;
-        const double value = criterion(cause.fit.log_likelihood, parameters_of(cause.fit), events);
-        if (!(value < best)) continue;
-        best = value;
-        found = &cause;
-      }
+      for (const std::vector<RankedCause>* hypotheses : {&ranking.singles, &ranking.pairs, &ranking.sets})
+        for (const RankedCause& cause : *hypotheses) {
+          if (cause.terms.size() != size || cause.fit.nuisance.empty() || !holds_all(cause, choice.effects)) continue;
+          const double value = criterion(cause.fit.log_likelihood, parameters_of(cause.fit), events);
+          if (!(value < best)) continue;
+          best = value;
+          found = &cause;
+        }
       if (!found) break;
       for (const EffectTerm& term : found->terms)
-        if (choice.effects.empty() || term.candidate->id != choice.effects.front())
+        if (std::ranges::find(choice.effects, term.candidate->id) == choice.effects.end())
           choice.effects.push_back(term.candidate->id);
     }
   }

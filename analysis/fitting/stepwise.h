@@ -16,8 +16,8 @@ struct StepwiseChoice {
 };
 
 /// Selects forward, by AICc (Hurvich and Tsai 1989) and by BIC (Schwarz 1978) over the model's events: from the
-/// recalibrated model to the best single effect that lowers the criterion, from it to the best pair with it. Uses the
-/// fits of the ranking and makes none: more than two effects are not tried, nor pairs that the ranking did not fit. The
+/// recalibrated model to the best single effect that lowers the criterion, from it to the best pair with it, and on to
+/// larger sets. Uses the fits of the ranking and makes none: sets that the ranking did not fit are not tried. The
 /// entries of a chosen variant (a leg, an interval) count as parameters where there is a choice.
 std::vector<StepwiseChoice> stepwise_selection(const TransitionModel& model, const Fit& recalibrated,
                                                const CauseRanking& ranking);

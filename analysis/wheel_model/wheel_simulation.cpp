@@ -64,16 +64,23 @@ Launch drawn_launch(const Simulation& s, const WheelRun& design, std::size_t ind
   return {std::max(0.1, launch->mean + e.sensor.launch_shift + sd * score(first[1])), shift};
 }
 
-// Returns the place of the collision that follows those of the run. @param slid  by the last foot [m]
+// What the last collision left: how far its foot slid [m], and omega+ [rad/s], where that is known.
+struct Left {
+  double slid = 0;
+  std::optional<double> plus;
+};
+
+// Returns the place of the collision that follows those of the run.
 dynamics::StepContext next_context(const ExtendedWheel& wheel, const WheelRun& run, const RunCollision& like,
-                                   double slid, double friction_shift) {
+                                   const Left& left, double friction_shift) {
   dynamics::StepContext context = like.context;
   if (run.collisions.empty()) {
     context.since_previous.reset();
   } else {
     const dynamics::StepContext& previous = run.collisions.back().context;
     context.leg = (previous.leg + 1) % wheel.legs();
-    context.position = previous.position + wheel.advance(previous.leg) + slid;
+    context.position = previous.position + wheel.advance(previous.leg) + left.slid;
+    if (left.plus && *left.plus > 0) context.since_previous = wheel.duration(previous, *left.plus);
   }
   context.friction_shift = friction_shift;
   return context;
@@ -87,36 +94,84 @@ struct DrawnCollision {
   ContactScores scores;
   std::optional<double> plus;     // omega+ [rad/s]; nothing: no energy is left
   ExtendedWheel::Drawn landed{};  // where a landing is a motion of its own
+  double below = 0;               // share of landings, by speed, that are slower
 };
 
-// Draws the contact of collision k by rejection: landings are as likely as the hypothesis tilts them.
+// A collision of a wheel that is about to be drawn.
+struct Landing {
+  const ExtendedWheel& wheel;
+  const RunCollision& like;
+  const dynamics::StepContext& context;
+  double omega;  // [rad/s]
+};
+
+// Returns the collision that three uniforms draw, each as likely as the contact alone has it.
 // @param before  scores of the collision before, which is remembered; nothing: there is none
-DrawnCollision drawn_collision(const Simulation& s, const ExtendedWheel& wheel, const RunCollision& like,
-                               const dynamics::StepContext& context, double omega,
-                               const std::optional<ContactScores>& before, std::size_t index, std::size_t k) {
+DrawnCollision proposed(const Simulation& s, const Landing& at, const std::optional<ContactScores>& before,
+                        const std::array<double, 3>& u) {
   const dynamics::Extension::ContactChange& e = s.hypothesis.extension.contact;
   const double rho = e.memory, left = std::sqrt(1 - rho * rho);
+  DrawnCollision drawn{{score(u[0]), score(u[1])}, {}};
+  if (rho != 0 && before) {
+    drawn.scores.restitution = rho * before->restitution + left * drawn.scores.restitution;
+    drawn.scores.friction = rho * before->friction + left * drawn.scores.friction;
+  }
+  const dynamics::Contact contact{s.restitution.at_score(drawn.scores.restitution),
+                                  s.friction.at_score(drawn.scores.friction)};
+  const auto& [wheel, like, context, omega] = at;
+  drawn.plus = wheel.omega_plus(context, omega, contact, u[2] < e.outlier_share);
+  drawn.below = drawn.plus ? wheel.after_collision(context, omega, *drawn.plus).below : 0.0;
+  if (!wheel.settles()) return drawn;
+  drawn.landed = wheel.land(context, omega, contact, u[2] < e.outlier_share);
+  if (!like.after)
+    drawn.below =
+        drawn.landed.next ? wheel.at_next_touch(context, omega, {}, s.noise, *drawn.landed.next).speed.below : 0.0;
+  return drawn;
+}
+
+// Draws the contact of collision k by rejection: landings are as likely as the hypothesis tilts them.
+DrawnCollision drawn_collision(const Simulation& s, const Landing& at, const std::optional<ContactScores>& before,
+                               std::size_t index, std::size_t k) {
   constexpr std::uint64_t attempts = 60;
   for (std::uint64_t attempt = 0;; ++attempt) {
     const auto u = uniforms(s.seed, index, 1 + k * 64 + attempt);
-    DrawnCollision drawn{{score(u[0]), score(u[1])}, {}};
-    if (rho != 0 && before) {
-      drawn.scores.restitution = rho * before->restitution + left * drawn.scores.restitution;
-      drawn.scores.friction = rho * before->friction + left * drawn.scores.friction;
-    }
-    const dynamics::Contact contact{s.restitution.at_score(drawn.scores.restitution),
-                                    s.friction.at_score(drawn.scores.friction)};
-    drawn.plus = wheel.omega_plus(context, omega, contact, u[2] < e.outlier_share);
-    double below = drawn.plus ? wheel.after_collision(context, omega, *drawn.plus).below : 0.0;
-    if (wheel.settles()) {
-      drawn.landed = wheel.land(context, omega, contact, u[2] < e.outlier_share);
-      if (!like.after)
-        below =
-            drawn.landed.next ? wheel.at_next_touch(context, omega, {}, s.noise, *drawn.landed.next).speed.below : 0.0;
-    }
+    const DrawnCollision drawn = proposed(s, at, before, {u[0], u[1], u[2]});
     const ScoreTilt& tilt = s.hypothesis.tilt;
-    if (attempt + 1 == attempts || u[3] * tilt.largest_density() <= std::exp(tilt.log_density(below))) return drawn;
+    if (attempt + 1 == attempts || u[3] * tilt.largest_density() <= std::exp(tilt.log_density(drawn.below)))
+      return drawn;
   }
+}
+
+bool rests_after(const Landing& at, const DrawnCollision& drawn) {
+  return at.wheel.settles() ? !drawn.landed.next : !drawn.plus || *drawn.plus < at.wheel.barrier(at.context);
+}
+
+// Returns the probability that a collision comes to rest, given what is remembered of the one before: where contacts
+// remember, that is no function of the speed alone, and it is summed over a lattice of contacts with a random shift
+// (Cranley and Patterson 1976; Korobov's generators for 64 points).
+double rest_probability(const Simulation& s, const Landing& at, const std::optional<ContactScores>& before,
+                        std::size_t index, std::size_t k) {
+  const auto& [wheel, like, context, omega] = at;
+  if (s.hypothesis.extension.contact.memory == 0 || !before)
+    return s.hypothesis.tilt.below(wheel.settles()
+                                       ? wheel.rest_share(context, omega, std::nullopt)
+                                       : wheel.after_collision(context, omega, wheel.barrier(context)).below);
+  constexpr std::size_t points = 64;
+  constexpr std::array<std::size_t, 3> generators{1, 19, 41};  // 19^2 mod 64
+  const auto shift = uniforms(s.seed ^ 0x6c617474696365ULL, index, k);
+  double rests = 0, all = 0;
+  for (std::size_t i = 0; i < points; ++i) {
+    std::array<double, 3> u{};
+    for (std::size_t d = 0; d < u.size(); ++d) {
+      const double place = shift[d] + static_cast<double>(i * generators[d] % points) / points;
+      u[d] = std::clamp(place - std::floor(place), 1e-12, 1 - 1e-12);
+    }
+    const DrawnCollision drawn = proposed(s, at, before, u);
+    const double weight = std::exp(s.hypothesis.tilt.log_density(drawn.below));
+    all += weight;
+    if (rests_after(at, drawn)) rests += weight;
+  }
+  return rests / all;
 }
 
 // Sets what is reported of a collision, with the errors of sensors and law.
@@ -149,7 +204,7 @@ void make_as_measured(const Simulation& s, const WheelRun& design, const Extende
   mark_jam(s.measured, run);
 }
 
-// Simulates one trial; `visit` sees the probability of rest in each of its collisions.
+// Simulates one trial; `visit` sees each of its collisions before it is drawn, with what is remembered.
 template <class Visit>
 WheelRun drawn_run(const Simulation& s, const WheelRun& design, std::size_t index, Visit visit) {
   const ExtendedWheel& wheel = s.wheels[design.condition];
@@ -158,24 +213,24 @@ WheelRun drawn_run(const Simulation& s, const WheelRun& design, std::size_t inde
   WheelRun run = design;
   run.collisions.clear();
   run.outcome = dynamics::Outcome::max_collisions;
-  double omega = launch.omega, slid = 0;
+  double omega = launch.omega;
+  Left left;
   std::optional<ContactScores> before;
   const std::size_t most =
       std::max<std::size_t>(design.outcome == dynamics::Outcome::rest ? 16 : 1, design.collisions.size());
   for (std::size_t k = 0; k < most; ++k) {
     const RunCollision& like = design.collisions[std::min(k, design.collisions.size() - 1)];
     RunCollision m;
-    m.context = next_context(wheel, run, like, slid, launch.friction_shift);
+    m.context = next_context(wheel, run, like, left, launch.friction_shift);
     if (hypothesis.varied)
       hypothesis.varied(collision_place(run, index % s.measured.runs.size(), k, m, omega), m.context);
-    const DrawnCollision drawn = drawn_collision(s, wheel, like, m.context, omega, before, index, k);
+    const Landing landing{wheel, like, m.context, omega};
+    visit(landing, before, k);
+    const DrawnCollision drawn = drawn_collision(s, landing, before, index, k);
     before = drawn.scores;
-    const double barrier = wheel.barrier(m.context);
-    visit(hypothesis.tilt.below(wheel.settles() ? wheel.rest_share(m.context, omega, std::nullopt)
-                                                : wheel.after_collision(m.context, omega, barrier).below));
-    const bool rests = wheel.settles() ? !drawn.landed.next : !drawn.plus || *drawn.plus < barrier;
+    const bool rests = rests_after(landing, drawn);
     report(s, like, drawn, omega, rests, uniforms(s.seed ^ 0x6e6f697365ULL, index, k), m);
-    slid = s.measured.slides_seen ? drawn.landed.displacement : 0;
+    left = {s.measured.slides_seen ? drawn.landed.displacement : 0, wheel.settles() ? std::nullopt : drawn.plus};
     run.collisions.push_back(m);
     const auto next = rests ? std::nullopt : wheel.settles() ? drawn.landed.next : wheel.next(m.context, *drawn.plus);
     if (!next) {
@@ -194,7 +249,7 @@ std::vector<WheelRun> simulated_runs(const WheelRuns& design, const WheelHypothe
   const Simulation simulation(design, hypothesis, seed);
   std::vector<WheelRun> runs;
   for (std::size_t t = 0; t < design.runs.size(); ++t)
-    runs.push_back(drawn_run(simulation, design.runs[t], t, [](double) {}));
+    runs.push_back(drawn_run(simulation, design.runs[t], t, [](const auto&...) {}));
   return runs;
 }
 
@@ -204,10 +259,11 @@ double simulated_steps(const WheelRuns& design, const WheelHypothesis& hypothesi
   constexpr std::size_t rounds = 4;
   for (std::size_t round = 0; round < rounds; ++round)
     for (std::size_t t = 0; t < design.runs.size(); ++t)
-      drawn_run(simulation, design.runs[t], t + round * design.runs.size(), [&](double probability) {
-        steps += 1;
-        hazard += probability;
-      });
+      drawn_run(simulation, design.runs[t], t + round * design.runs.size(),
+                [&](const Landing& at, const std::optional<ContactScores>& before, std::size_t k) {
+                  steps += 1;
+                  hazard += rest_probability(simulation, at, before, t + round * design.runs.size(), k);
+                });
   return hazard > 0 ? steps / hazard : std::numeric_limits<double>::infinity();
 }
 

@@ -77,8 +77,8 @@ ExtendedWheel::Leg ExtendedWheel::leg_of(const Wheel& stated, const Wheel& wheel
   return leg;
 }
 
-// Stores for each leg the stated wheel's gain and barrier, and how much more the torques take off a landing than off a
-// standing foot.
+// Stores for each leg the stated wheel's gain and barrier, how much more the torques take off a landing than off a
+// standing foot, and by how much they raise the friction below which it rests.
 void ExtendedWheel::hold_against_stated(const ExtendedWheel& stated) {
   const Extension::Torques& torques = extension_.torques;
   for (std::size_t k = 0; k < geometry_.size(); ++k) {
@@ -89,6 +89,8 @@ void ExtendedWheel::hold_against_stated(const ExtendedWheel& stated) {
     const double standing = work(stated.path(here), drag.carried_squared);
     const double landing = torques.rolling * drag.lost[0] + torques.viscous * drag.lost[1] + torques.air * drag.lost[2];
     if (std::abs(standing) > 0) geometry_[k].drag_ratio = landing / standing;
+    geometry_[k].resting_shift =
+        torques.rolling * drag.resting[0] + torques.viscous * drag.resting[1] + torques.air * drag.resting[2];
   }
 }
 
@@ -320,6 +322,7 @@ SettledLanding ExtendedWheel::landing(const StepContext& context, double omega) 
   at.gyration_sq = leg.gyration_sq;
   at.barrier_squared = stated.barrier_squared + climb * climb - leg.stated_barrier * leg.stated_barrier;
   at.loss_ratio = change(context, omega).loss_ratio;
+  at.resting_shift = leg.resting_shift;
   const Path way = path(context);
   at.next_rate = stated.next_rate;
   at.next_gain = stated.next_gain + way.gain - leg.stated_gain;

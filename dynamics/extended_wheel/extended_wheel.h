@@ -149,7 +149,8 @@ class ExtendedWheel {
     double gyration_sq = 0;  // of its landing; `settled`
     double eccentric_phase = 0;
     double stated_gain = 0, stated_barrier = 0;  // of the stated wheel's stance, of omega^2
-    double drag_ratio = 1;  // what resisting torques take off beside what they take off a foot that stands
+    double drag_ratio = 1;     // what resisting torques take off beside what they take off a foot that stands
+    double resting_shift = 0;  // what they add to the friction below which the wheel rests
   };
   struct Path {  // of one stance
     double start = 0, end = 0, pendulum = 0, gain = 0, inertia = 0;

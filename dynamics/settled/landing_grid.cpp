@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <optional>
 
 #include "dynamics/settled/settled_map.h"
 
@@ -75,22 +76,51 @@ void fill_settling(LandingShares& grid, const SettledMap& map) {
   }
 }
 
-// Finds it by landings of a sticking foot with small torques; none where it does not get on.
+// Returns the friction below which a wheel comes to rest; nothing where even a sticking foot does, or none.
+std::optional<double> resting_friction(const SettledMotion& motion, int leg, double omega, double eta) {
+  constexpr double step = 2e-3, width = 1e-7;
+  const auto rests = [&](double mu) {
+    const LandingEnd end = motion.land(leg, omega, {eta, mu}).end;
+    return end == LandingEnd::rest || end == LandingEnd::given_up;
+  };
+  double high = sticking_friction(motion.wheel(), leg) + clear_of_sticking;
+  if (rests(high)) return {};
+  double low = high;
+  while (!rests(low)) {
+    high = low;
+    low -= step;
+    if (!(low > 0)) return {};
+  }
+  while (high - low > width) {
+    const double middle = (low + high) / 2;
+    (rests(middle) ? low : high) = middle;
+  }
+  return high;
+}
+
+// Finds it by landings with small torques: of a sticking foot, none where it does not get on, and of one that slides.
 LandingShares::Drag drag_of(const SettledMotion& motion, int leg, double omega, double eta) {
   const Contact contact{eta, sticking_friction(motion.wheel(), leg) + clear_of_sticking};
   const Step free = motion.step(leg, omega, contact);
   LandingShares::Drag drag{free.landing.carried_squared, {}};
   if (!free.touched) return drag;
-  constexpr double share = 1e-3;  // of the weight's torque about the foot
+  constexpr double share = 1e-3, share_sliding = 1e-2;  // of the weight's torque about the foot
   const SettledWheel& wheel = motion.wheel();
   const double torque = share * wheel.mass * wheel.gravity * wheel.length(leg);
+  const std::optional<double> resting = resting_friction(motion, leg, omega, eta);
   for (std::size_t power = 0; power < drag.lost.size(); ++power) {
-    SettledWheel dragged = wheel;
     const double size = torque / std::pow(omega, static_cast<double>(power));
-    (power == 0 ? dragged.constant_drag : power == 1 ? dragged.linear_drag : dragged.quadratic_drag) = size;
-    const Step slowed = SettledMotion(dragged).step(leg, omega, contact);
+    const auto with = [&](double times) {
+      SettledWheel dragged = wheel;
+      (power == 0 ? dragged.constant_drag : power == 1 ? dragged.linear_drag : dragged.quadratic_drag) = times * size;
+      return SettledMotion(dragged);
+    };
+    const Step slowed = with(1).step(leg, omega, contact);
     if (slowed.touched)
       drag.lost[power] = (free.omega_minus * free.omega_minus - slowed.omega_minus * slowed.omega_minus) / size;
+    const double more = share_sliding / share;
+    if (const auto dragged = resting ? resting_friction(with(more), leg, omega, eta) : std::nullopt)
+      drag.resting[power] = (*dragged - *resting) / (more * size);
   }
   return drag;
 }

@@ -22,6 +22,8 @@ struct LandingShares {
   struct Drag {
     double carried_squared = 0;
     std::array<double, 3> lost{};
+    /// Rise of mu_r per torque: a foot that slides must be stopped while they slow the wheel.
+    std::array<double, 3> resting{};
   };
   struct Leg {
     Drag drag;

@@ -294,10 +294,11 @@ void add_all(NextTouchSum& sum, const SettledLanding& landing, const Weights& we
   restitutions<nodes_of_all>(least, most, [&](double eta, double weight) {
     const double mass = share * weight * weights.restitution_density(eta);
     const LandingShares::SharesAtRestitution at = landing.place.at_restitution(eta);
-    const double resting = at.resting_friction(), width = own - resting;
-    // It starts from somewhat below the grid's mu_r, that the wheel's own may be lower.
-    mu[0] = resting - 0.1 * width;
-    LandingShares::Kept last = landing.carried_as(at.at(mu[0]));
+    const double of_grid = at.resting_friction(), resting = landing.resting(of_grid), width = own - resting;
+    // It starts from somewhat below mu_r, that the wheel's own may be lower.
+    constexpr double lower = 0.1;
+    mu[0] = resting - lower * width;
+    LandingShares::Kept last = landing.carried_as(at.at(of_grid - lower * (own - of_grid)));
     cells.squared[0] = last.share;
     for (std::size_t k = 0; k < cells.count; ++k) {
       mu[k + 1] = resting + LandingShares::part(cell_places[k]) * width;
@@ -354,8 +355,18 @@ double SettledLanding::first_impact(const Contact& contact) const {
   return std::max(0.0, 1 - first_loss_ratio() * lost);
 }
 
+double SettledLanding::resting(double of_grid) const {
+  constexpr double most = 0.9;  // of the way to mu_c
+  return of_grid + std::min(resting_shift, most * std::max(0.0, place.leg().sticking - of_grid));
+}
+
 LandingShares::Kept SettledLanding::carried(const Contact& contact) const {
-  return carried_as(place.at(contact.restitution, contact.friction - sticking() + place.leg().sticking));
+  const double own = place.leg().sticking;
+  double below = sticking() - contact.friction;  // mu_c
+  const LandingShares::SharesAtRestitution at = place.at_restitution(contact.restitution);
+  if (const double of_grid = at.resting_friction(); resting_shift != 0 && of_grid < own)
+    below *= (own - of_grid) / (own - resting(of_grid));
+  return carried_as(at.at(own - below));
 }
 
 LandingShares::Kept SettledLanding::carried_as(const LandingShares::Kept& of_grid) const {

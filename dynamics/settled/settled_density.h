@@ -29,7 +29,8 @@ struct SettledLanding {
   /// coefficients these are, of omega_eq^2 [rad^2/s^2].
   double next_rate = 1, next_gain = 0;
   std::array<double, 3> dragged{};
-  double next_ratio = 1;  ///< multiplies the next omega-
+  double next_ratio = 1;     ///< multiplies the next omega-
+  double resting_shift = 0;  ///< added to mu_r, below which the wheel rests; mu_c stays
 
   /// Returns omega- at the next touch from omega_eq^2 [rad/s]; rising.
   double next(double omega_eq_squared) const {
@@ -52,8 +53,10 @@ struct SettledLanding {
   double first_loss_ratio() const;
   /// Returns omega+ / omega- of the first impact, which starts without slip.
   double first_impact(const Contact& contact) const;
-  /// Returns omega_eq^2 [rad^2/s^2] and the slide [m]: the grid's share at the same distance from mu_c, moved by what a
-  /// plastic landing of this wheel keeps more or less than one of the grid's.
+  /// Returns mu_r of the grid moved by `resting_shift`, by so little that it stays below the grid's mu_c.
+  double resting(double of_grid) const;
+  /// Returns omega_eq^2 [rad^2/s^2] and the slide [m]: the grid's share at the same part of the way from mu_r to mu_c,
+  /// moved by what a plastic landing of this wheel keeps more or less than one of the grid's.
   LandingShares::Kept carried(const Contact& contact) const;
   /// Returns the same from what the grid keeps there.
   LandingShares::Kept carried_as(const LandingShares::Kept& of_grid) const;

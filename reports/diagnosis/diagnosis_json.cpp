@@ -149,9 +149,16 @@ Json unnamed_facets_json(const analysis::Diagnosis& d) {
 }
 
 Json left_json(const analysis::Diagnosis& d) {
-  if (d.shrinkage.measures.empty()) return {{"nats", nullptr}, {"interval_90", nullptr}};
+  const std::optional<Estimate>& ignoring = d.shrinkage.steps.without_unnamed;
+  Json json{{"nats", nullptr},
+            {"interval_90", nullptr},
+            {"steps_ratio", share_json(ignoring)},
+            {"steps_ratio_interval_90", interval_json(ignoring)}};
+  if (d.shrinkage.measures.empty()) return json;
   const analysis::Shrinkage& s = d.shrinkage.measures.front();
-  return {{"nats", number(s.with_effect)}, {"interval_90", {number(s.with_effect_lower), number(s.with_effect_upper)}}};
+  json["nats"] = number(s.with_effect);
+  json["interval_90"] = {number(s.with_effect_lower), number(s.with_effect_upper)};
+  return json;
 }
 
 Json where_json(const std::vector<analysis::GapCell>& cells) {

@@ -66,6 +66,8 @@ void expect_found(const dynamics::Effect& effect, const std::vector<std::string>
   }
 }
 
+constexpr double form = 0.05;  // error of the logarithm of steps that is put down to the form of a model
+
 Setting rigid_setting() {
   Setting base = stand_in_setting();
   base.law = dynamics::Law::settled;
@@ -96,6 +98,52 @@ dynamics::Effect clearly_seen(const SizedEffect& sized) {
     if (model->evaluate(nuisance, with).total() > model->evaluate(nuisance, {}).total() + 16 || size == sized.largest)
       return effect;
   }
+}
+
+// Compares what the model with an effect expects in steps before failure with what the laboratory counts.
+void expect_steps(const Setting& base, const dynamics::Effect& effect, int trials) {
+  const std::string text = effect_text(effect);
+  const std::vector<LaboratoryCondition> conditions{{"slow", base, trials}};
+  const dynamics::LaboratorySetup setup =
+      laboratory_setup(conditions, {.effects = {effect}, .sensor_noise = 0.001, .flight = false, .seed = 9});
+  const auto model = model_of(laboratory_files(conditions, setup, run_laboratory(setup, 0), {}));
+  const std::vector<double> truth =
+      true_nuisances(*model, stated_values(base.restitution, base.friction, base.wheel.leg_length));
+  const double expected = model->expected_steps(truth, std::vector{fitted_term(*model, effect)}, 1);
+  const auto [at_risk, rests] = model->rests();
+  ASSERT_GT(rests, 5) << text;
+  EXPECT_NEAR(std::log(expected * rests / at_risk), 0, 3.5 / std::sqrt(rests) + form) << text;
+}
+
+Setting slow_launches(Setting base, double slope_deg, double speed) {
+  base.slope_deg = slope_deg;
+  base.initial_speed = {speed, 0.3};
+  return base;
+}
+
+TEST(LaboratoryAgreement, ExpectedStepsAreThoseCounted) {
+  const Setting base = slow_launches(stand_in_setting(), 7.02, 5.5);
+  for (const SizedEffect& sized : sized_effects())
+    if (const dynamics::Effect effect = sized.at(std::min(sized.largest, 4 * sized.start));
+        can_be_had(effect.id, dynamics::Law::published))
+      expect_steps(base, effect, 800);
+}
+
+// What contacts remember changes how often a wheel comes to rest at a speed, and a ramp that rings is in another phase
+// where the wheel is slower.
+TEST(LaboratoryAgreement, ExpectedStepsKnowWhatTheCollisionBeforeWas) {
+  const Setting base = slow_launches(stand_in_setting(), 7.02, 5.5);
+  expect_steps(base, {"contact_memory", {0.6}}, 1500);
+  expect_steps(base, {"ramp_vibration", {0.16, 33.7}}, 3000);
+}
+
+// Under `settled` a wheel also rests because its foot slides too far, and torques raise the friction that stops it.
+TEST(LaboratoryAgreement, ExpectedStepsAreThoseCountedUnderSettled) {
+  const Setting base = slow_launches(rigid_setting(), 9.59, 5);
+  for (const char* text :
+       {"rolling_resistance:torque_n_m=0.032", "axle_drag_viscous:n_m_s=0.016", "air_drag:n_m_s2=0.003",
+        "slope_offset:offset_deg=-0.8", "leg_contact:leg=5,friction_ratio=0.9"})
+    expect_steps(base, dynamics::effect_from_text(text, true_values), 400);
 }
 
 // An effect of the catalogue stands in four places. Forgotten in the last two it would be called absent without notice;

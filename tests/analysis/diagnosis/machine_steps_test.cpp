@@ -97,6 +97,19 @@ TEST(MachineSteps, AModelThatLacksEverythingLeavesTheCountAlone) {
   EXPECT_LT(e.upper, 1.4 / quantile(rate, 0.05));
 }
 
+// What a model leaves out multiplies its steps: by its prior where few failures were counted, else by what they say.
+TEST(MachineSteps, TheCostOfIgnoringIsWhatTheCountSaysOfTheModel) {
+  const std::vector<double> draws(10, 300.0);
+  const Estimate few = steps_of_model_by_machine(draws, {0.5, 0}, 0, 0);
+  EXPECT_NEAR(few.value, 1, 0.03);
+  EXPECT_NEAR(few.upper, std::exp(0.5 * 1.645), 0.05);
+  const Estimate many = steps_of_model_by_machine(draws, {3, 0}, 40000, 400);  // a hundred steps
+  EXPECT_NEAR(many.value, 3, 0.3);
+  EXPECT_LT(many.upper, 3.6);
+  EXPECT_GT(many.lower, 2.5);
+  EXPECT_EQ(steps_of_model_by_machine({infinity}, {1, 0}, 100, 3).value, infinity);
+}
+
 // Where nothing was counted, or much less than the model knows, the model's own interval stands.
 TEST(MachineSteps, ACountThatSaysLittleLeavesTheModel) {
   const std::vector<double> draws = lognormal(300, 0.1);

@@ -169,10 +169,57 @@ TEST(Verdict, PairsAreAlikeWhereWhatTheyDoNotShareIs) {
   EXPECT_EQ(with_pairs(0.99).causes.alike,
             (std::vector<std::string>{"trial_drift+inertia", "slope_offset+trial_drift"}));
   EXPECT_TRUE(with_pairs(0.8).causes.alike.empty());
-  EXPECT_EQ(
-      sentences(with_pairs(0.99)).front(),
-      "There is a gap that recalibration does not remove. These data cannot tell 3 causes apart: alike in these "
-      "trials beside trial_drift (inertia, slope_offset), trial_drift+bounce.");
+  EXPECT_EQ(sentences(with_pairs(0.99)).front(),
+            "There is a gap that recalibration does not remove. These data cannot tell 3 causes apart: alike in these "
+            "trials beside trial_drift (inertia, slope_offset), trial_drift+bounce.");
+}
+
+// Where something without a name stays only effects that the field calls by one name stand together: a torque is at
+// work, whichever it is, but not one of two rivals that have nothing in common.
+TEST(AtWork, OfOneNameAreOneGroup) {
+  const auto with = [](const std::string& rival) {
+    std::vector<Cause> ranked(2);
+    ranked[0].effects = {"bounce", "slope_offset"};
+    ranked[1].effects = {"bounce", rival};
+    for (Cause& cause : ranked) {
+      cause.probability = &cause == ranked.data() ? 0.6 : 0.39;
+      cause.parameters.resize(2);
+    }
+    Diagnosis::Data data = enough_data();
+    data.groups = {{"a constant torque", {"slope_offset", "rolling_resistance"}}};
+    return judged(ranked, {0, 0, 1e6}, a_gap, data).causes.at_work;
+  };
+  const std::vector<AtWork> torque = with("rolling_resistance");
+  ASSERT_EQ(torque.size(), 2u);
+  EXPECT_EQ(torque[1].name, "a constant torque");
+  EXPECT_GT(torque[1].probability, 0.9);
+  EXPECT_LT(with("trial_drift")[1].probability, 0.7);
+}
+
+// Rivals of which none is likely enough by itself, and which a design would tell apart, are at work as a group: the gap
+// is explained by one of them. Where a gap itself is too unsure for that it is not explained.
+TEST(AtWork, RivalsAreAGroupWhereNoneIsLikelyByItself) {
+  const auto cause = [](const std::string& effect, double probability) {
+    Cause one;
+    one.effects = {effect};
+    one.probability = probability;
+    one.parameters.resize(1);
+    return one;
+  };
+  const Diagnosis d =
+      judged({cause("inertia", 0.5), cause("bounce", 0.35), cause("trial_drift", 0.14)}, {}, a_gap, enough_data());
+  EXPECT_EQ(d.verdict, Verdict::explained);
+  ASSERT_EQ(d.causes.at_work.size(), 2u);
+  EXPECT_EQ(d.causes.at_work[0].effects, (std::vector<std::string>{"inertia", "bounce"}));
+  EXPECT_NEAR(d.causes.at_work[0].probability, 0.85 / 0.99, 1e-12);
+  EXPECT_EQ(d.causes.at_work[1].effects, std::vector<std::string>{"trial_drift"});
+
+  Probabilities unsure;
+  unsure.ranked = {cause("inertia", 0.4), cause("bounce", 0.3)};
+  unsure.recalibrate = 0.3;
+  const Named named = give_verdict(unsure, {}, a_gap, {}, enough_data(), "contact_distribution", Rules{});
+  EXPECT_EQ(named.verdict, Verdict::unexplained);
+  EXPECT_TRUE(named.set.empty());
 }
 
 // An interval that reaches further up than down stays so, alone and averaged over hypotheses that say the same; where

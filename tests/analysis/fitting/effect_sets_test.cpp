@@ -11,6 +11,7 @@
 
 #include "analysis/fitting/bayes_factor.h"
 #include "analysis/fitting/cause_ranking.h"
+#include "analysis/fitting/stepwise.h"
 #include "tests/analysis/line.h"
 
 namespace metastable::analysis {
@@ -80,10 +81,33 @@ const RankedCause* find_set(const std::vector<RankedCause>& all, const std::set<
 TEST(EffectSets, NameAsManyEffectsAsAreThere) {
   const Line noise = line(0, 1, 2400);
   const std::set<std::string> two{"wave 0", "wave 1"}, three{"wave 0", "wave 1", "wave 2"},
-      four{"wave 0", "wave 1", "wave 2", "wave 3"};
+      four{"wave 0", "wave 1", "wave 2", "wave 3"}, five{"wave 0", "wave 1", "wave 2", "wave 3", "wave 4"};
   EXPECT_EQ(best_of(ranked(Waves(noise, 2))), two);
   EXPECT_EQ(best_of(ranked(Waves(noise, 3))), three);
   EXPECT_EQ(best_of(ranked(Waves(noise, 4))), four);
+  EXPECT_EQ(best_of(ranked(Waves(noise, 5))), five);
+}
+
+// Forward selection goes on from pairs to larger sets, as far as the ranking fitted them.
+TEST(EffectSets, StepwiseSelectionGoesOnToThree) {
+  const Waves model(line(0, 1, 2400), 3);
+  for (const StepwiseChoice& choice : stepwise_selection(model, fit(model, {0, 0}, {}), ranked(model)))
+    for (const char* wave : {"wave 0", "wave 1", "wave 2"})
+      EXPECT_TRUE(std::ranges::find(choice.effects, wave) != choice.effects.end()) << choice.criterion << wave;
+}
+
+// Whatever led the search to a set of five, what stays without each of its effects was tried, too.
+TEST(EffectSets, HoldWhatStaysWithoutEachEffectOfALargerOne) {
+  constexpr std::size_t at_work = 5;
+  const Waves model(line(0, 1, 2400), at_work);
+  const CauseRanking ranking = ranked(model);
+  for (std::size_t without = 0; without < at_work; ++without) {
+    std::set<std::string> part;
+    for (std::size_t k = 0; k < at_work; ++k)
+      if (k != without) part.insert("wave " + std::to_string(k));
+    const RankedCause* found = find_set(ranking.sets, part);
+    EXPECT_TRUE(found && std::isfinite(found->evidence)) << without;
+  }
 }
 
 // Effects that are independent of one another gain together what they gain alone.
