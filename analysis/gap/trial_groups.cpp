@@ -9,7 +9,6 @@
 #include <functional>
 #include <map>
 #include <numbers>
-#include <set>
 #include <utility>
 
 #include "analysis/fitting/rules.h"
@@ -48,6 +47,16 @@ std::size_t fewest_of(std::size_t trials) {
   return std::max(fewest_in_group, static_cast<std::size_t>(std::ceil(least_share * static_cast<double>(trials))));
 }
 
+// Subtracts the mean of each condition: what a model lacks may say something else in each.
+std::vector<TrialValue> beside_their_condition(const TransitionModel& model, std::vector<TrialValue> values) {
+  std::vector<std::size_t> condition(model.trials());
+  for (const Event& event : model.events()) condition[event.trial] = event.condition;
+  std::map<std::size_t, HeapSums> sums;
+  for (const TrialValue& one : values) sums[condition[one.trial]].add(one);
+  for (TrialValue& one : values) one.value -= sums[condition[one.trial]].mean();
+  return values;
+}
+
 // Returns [trials] what the scores say of a parameter by itself, in the trials whose steps tell of it; nothing where
 // many trials do not, as of what depends on their order, and of what changes the spread of scores. Steps weigh alike:
 // trials far off the model have another information, and few of them must not stand for all.
@@ -77,16 +86,7 @@ std::vector<TrialValue> trial_values(const TransitionModel& model, const Eigen::
   for (std::size_t t = 0; t < weight.size(); ++t)
     if (events[t] > 0 && weight[t] > poor_share * usual * events[t])
       values.push_back({t, along[t] / weight[t], usual * events[t]});
-  return values;
-}
-
-// Says whether trials of one condition are all in one group, for every condition.
-bool follow_conditions(const TransitionModel& model, const TwoGroups& groups) {
-  if (model.conditions() < 2) return false;
-  const std::set<std::size_t> fewer(groups.fewer.begin(), groups.fewer.end());
-  std::map<std::size_t, std::set<bool>> sides;
-  for (const Event& event : model.events()) sides[event.condition].insert(fewer.contains(event.trial));
-  return std::ranges::all_of(sides, [](const auto& one) { return one.second.size() == 1; });
+  return beside_their_condition(model, std::move(values));
 }
 
 // Says whether an effect is that trials differ from each other.
@@ -229,7 +229,7 @@ std::optional<TrialGroups> trial_groups(const TransitionModel& model, const Effe
     for (const Direction& one : all) {
       std::vector<TrialValue> values = trial_values(model, one.change, recalibrated.evaluation.score);
       std::optional<TwoGroups> groups = in_order ? broken(values) : split(std::move(values));
-      if (!groups || (along && groups->gain <= most.gain) || follow_conditions(model, *groups)) continue;
+      if (!groups || (along && groups->gain <= most.gain)) continue;
       along = &one;
       most = *std::move(groups);
     }

@@ -50,9 +50,8 @@ struct TrialGroups {
   bool in_order = false;  ///< one group comes after the other, and does not lie far enough apart to be told otherwise
 };
 
-/// Looks along every parameter that is refitted and every effect that all trials show alike. Groups that follow the
-/// conditions, and those that a hypothesis accounts for by what it says of the trials' order, time, place or labels,
-/// are none.
+/// Looks along every parameter that is refitted and every effect that all trials show alike, within the conditions.
+/// Groups that a hypothesis accounts for by what it says of the trials' order, time, place or labels are none.
 /// @param scan  of the recalibrated model  @param chosen  fit of the likeliest hypothesis
 std::optional<TrialGroups> trial_groups(const TransitionModel& model, const EffectScan& scan, const Fit& recalibrated,
                                         const Fit& chosen, std::uint64_t seed);

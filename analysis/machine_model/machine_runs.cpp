@@ -236,8 +236,8 @@ std::vector<std::string> trials_in_other_units(const MachineRuns& runs, const Tr
   return {};
 }
 
-// Compares the first rows with the launch that is stated. The likelihood starts each trial from its measured first row,
-// so that no later test compares the two.
+// Compares the first rows with the launch that is stated. The effects of the launch do so, too, but a catalogue may
+// leave them out.
 std::vector<std::string> other_launches(const Machine& machine, const MachineRuns& runs) {
   std::vector<std::string> said;
   for (const MachineLaunch& launch : machine.launches) {

@@ -428,7 +428,7 @@ def study(setting: Setting, *, method: Optional[str] = None, cells: Optional[int
 def study(setting: Union[WalkerSetting, Walker, Machine], *, method: Optional[str] = None,
           tolerance: Optional[float] = None, spacing: Optional[float] = None,
           simulated_steps: Optional[int] = None, guided_samples: Optional[int] = None,
-          memory_gb: Optional[float] = None, level: Optional[Callable[..., ArrayLike]] = None,
+          memory_gb: Optional[float] = None, level: Union[str, Callable[..., ArrayLike], None] = None,
           how_it_fails: bool = False, seed: int = 1, threads: int = 0, time_limit: Optional[float] = None,
           progress: Progress = None) -> WalkerStudy: ...
 

@@ -67,7 +67,9 @@ TEST_F(SimulateCommand, RealityLeavesNothingBehindWhenItIsMisunderstood) {
   EXPECT_EQ(walker("simplest", {"--effect", "hip_damping:damping=3"}),
             "metastable: effect hip_damping: damping: 3 is outside [0, 2]\n");
   EXPECT_EQ(walker("simplest", {"--effect", "leg_mass:higher=0.1"}),
-            "metastable: --effect: 'leg_mass' is none of hip_damping, hip_dry_friction, impact_loss, foot_slip\n");
+            "metastable: --effect: 'leg_mass' is none of hip_damping, hip_dry_friction, impact_loss, foot_slip, "
+            "launch_half_angle_rad, launch_stance_rate_rad_s, launch_spread_half_angle_rad, "
+            "launch_spread_stance_rate_rad_s\n");
   EXPECT_TRUE(left_behind().empty());
   const std::vector<std::string> fine{"simulate",          "--reality", "--effect",
                                       "inertia:ratio=1.1", "--effect",  "leg_contact:leg=3,friction_ratio=1.4",
