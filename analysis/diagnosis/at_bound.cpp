@@ -4,6 +4,8 @@
 
 #include <algorithm>
 #include <cmath>
+#include <optional>
+#include <string_view>
 
 namespace metastable::analysis {
 namespace {
@@ -19,15 +21,30 @@ End end_of(double value, double lower, double upper) {
   return value <= lower + near ? End::lower : value >= upper - near ? End::upper : End::none;
 }
 
-// Finds the reported number that moves most, relative to itself, from one list to the other.
-NamedValue most_moved(const std::vector<NamedValue>& here, const std::vector<NamedValue>& there) {
-  std::size_t most = 0;
-  double largest = -1;
+// Finds the reported number that moves most, relative to itself, from one list to the other; nothing where none does.
+std::optional<NamedValue> most_moved(const std::vector<NamedValue>& here, const std::vector<NamedValue>& there) {
+  std::optional<NamedValue> most;
+  double largest = 0;
   for (std::size_t k = 0; k < here.size(); ++k) {
     const double moved = std::abs(there[k].second - here[k].second) / std::max(1e-300, std::abs(here[k].second));
-    if (moved > largest) most = k, largest = moved;
+    if (moved > largest) most = here[k], largest = moved;
   }
-  return here[most];
+  return most;
+}
+
+// Says whether the lower end of a nuisance is next to nothing: an error, a scatter or a share that is not there. The
+// models call their logarithms "log friction_sd", so that a machine's parameter log_a or push_sd is none of them.
+bool ends_at_nothing(const std::string& name) {
+  if (name.starts_with("logit ")) return name.ends_with("_share");
+  return name.starts_with("log tick_jitter") || name.starts_with("log sensor sd") ||
+         (name.starts_with("log ") && name.ends_with("_sd"));
+}
+
+// Returns a nuisance that no reported number shows, by its own name, not as its logarithm.
+NamedValue by_itself(const std::string& name, double value) {
+  constexpr std::string_view logarithm = "log ";
+  if (name.starts_with(logarithm)) return {name.substr(logarithm.size()), std::exp(value)};
+  return {name, value};
 }
 
 AtBound told(const std::string& of, const NamedValue& number, End end) {
@@ -47,17 +64,19 @@ std::vector<AtBound> values_at_bound(const TransitionModel& model, const Fit& fi
       if (end == End::none || std::abs(term.values[p] - free.neutral) <= at_the_end * range) continue;
       std::vector<double> moved = term.values;
       moved[p] += (end == End::lower ? 1 : -1) * inwards * range;
-      all.push_back(told(term.candidate->id, most_moved(here, term.candidate->report(term.variant, moved)), end));
+      const std::optional<NamedValue> number = most_moved(here, term.candidate->report(term.variant, moved));
+      all.push_back(told(term.candidate->id, number.value_or(here.front()), end));
     }
   }
   const std::vector<NamedValue> here = model.report_nuisances(fit.nuisance);
   for (std::size_t p = 0; p < fit.nuisance.size(); ++p) {
     const Nuisance& n = model.nuisances()[p];
     const End end = end_of(fit.nuisance[p], n.lower, n.upper);
-    if (end == End::none || (end == End::lower && n.name.starts_with("log"))) continue;
+    if (end == End::none || (end == End::lower && ends_at_nothing(n.name))) continue;
     std::vector<double> moved = fit.nuisance;
     moved[p] += (end == End::lower ? 1 : -1) * inwards * (n.upper - n.lower);
-    all.push_back(told("", most_moved(here, model.report_nuisances(moved)), end));
+    const std::optional<NamedValue> number = most_moved(here, model.report_nuisances(moved));
+    all.push_back(told("", number.value_or(by_itself(n.name, fit.nuisance[p])), end));
   }
   return all;
 }

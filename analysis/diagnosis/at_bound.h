@@ -10,7 +10,8 @@
 namespace metastable::analysis {
 
 /// Lists those of a hypothesis: parameters of its effects, except at the value that means no effect, and nuisances, in
-/// that order. The lower end of a nuisance that is fitted by its logarithm is next to nothing, and not listed.
+/// that order. The lower end of an sd, a jitter or a share that is fitted by its logarithm is next to nothing, and not
+/// listed.
 std::vector<AtBound> values_at_bound(const TransitionModel& model, const Fit& fit);
 
 /// Says it in a sentence.

@@ -101,7 +101,7 @@ std::vector<AtWork> list_at_work(const Probabilities& probabilities, const Odds&
       for (const Cause& cause : ranked) {
         if (holds(cause, effect)) continue;
         const bool acts_alike = std::ranges::find(alike, cause.name()) != alike.end();
-        if (!acts_alike && probability(one.effects) >= rules.least_at_work) break;
+        if (!acts_alike && probability(one.effects) >= rules.least_at_work) continue;
         for (const std::string& other : cause.effects)
           if (!holds(ranked.front(), other) && (acts_alike || of_one_group(groups, effect, other)) &&
               std::ranges::find(one.effects, other) == one.effects.end())
@@ -142,8 +142,8 @@ void join_rivals(std::vector<AtWork>& at_work, const Probabilities& probabilitie
   }
   if (group.probability < rules.least_at_work) return;
   group.name = common_name(groups, group.effects);
-  std::erase_if(at_work, [&](const AtWork& one) {
-    return std::ranges::any_of(one.effects, [&](const std::string& effect) {
+  std::erase_if(at_work, [&](const AtWork& one) {  // what is in the group as a whole
+    return std::ranges::all_of(one.effects, [&](const std::string& effect) {
       return std::ranges::find(group.effects, effect) != group.effects.end();
     });
   });

@@ -96,8 +96,13 @@ class Keys {
     return std::nullopt;
   }
 
-  // Reads { mean = , sd = }.
+  // Reads { mean = , sd = }, both in one range.
   std::optional<Spread> spread(std::string_view key, bool required, const Range& either) {
+    return spread(key, required, either, either);
+  }
+
+  // Reads { mean = , sd = }, each in a range of its own.
+  std::optional<Spread> spread(std::string_view key, bool required, const Range& of_mean, const Range& of_sd) {
     const toml::node* node = find(key, required);
     if (node == nullptr) return std::nullopt;
     if (!node->is_table()) {
@@ -105,7 +110,7 @@ class Keys {
       return std::nullopt;
     }
     Keys keys(file_, *node->as_table(), path(key), defects_);
-    const std::optional<double> mean = keys.number("mean", true, either), sd = keys.number("sd", true, either);
+    const std::optional<double> mean = keys.number("mean", true, of_mean), sd = keys.number("sd", true, of_sd);
     keys.finish();
     if (!mean || !sd) return std::nullopt;
     return Spread{*mean, *sd};
@@ -297,17 +302,10 @@ void read_machine_column(Keys& columns, const std::string& state, std::vector<Wa
 
 // Reads the launches that are stated, { mean = , sd = } by state.
 void read_walk_launches(Keys& keys, const std::vector<std::string>& states, WalkDescription& walks) {
-  constexpr Range any{.low = -30, .high = 30};
-  for (const std::string& state : states) {
-    const toml::node* node = keys.find(state, false);
-    if (node == nullptr) continue;
-    const std::optional<Spread> launch = keys.spread(state, true, any);
-    if (!launch) continue;
-    if (launch->sd < 0)
-      keys.report(*node, fmt::format("launch.{}.sd: {} is outside [0, 30]", state, launch->sd));
-    else
+  constexpr Range scatter{.low = 0, .high = 30};
+  for (const std::string& state : states)
+    if (const std::optional<Spread> launch = keys.spread(state, false, walk_column_range(state), scatter))
       walks.launches.emplace_back(state, *launch);
-  }
   keys.finish();
 }
 
@@ -341,6 +339,11 @@ void parse_experiment_toml(const std::string& file, std::string_view text, Exper
   root.finish();
 }
 
+Range walk_column_range(std::string_view state) {
+  if (state == "half_angle_rad") return {.low = 0, .high = 1.5707963267948966, .low_open = true, .high_open = true};
+  return {.low = -30, .high = 30};  // [rad/s]: ten times what gaits have; degrees are beyond
+}
+
 std::optional<WalkDescription> parse_walk_toml(const std::string& file, std::string_view text, Defects& defects) {
   const std::optional<toml::table> table = parse(file, text, defects);
   if (!table || table->get("system") == nullptr || table->get("system")->value<std::string>() != "machine")
@@ -352,7 +355,9 @@ std::optional<WalkDescription> parse_walk_toml(const std::string& file, std::str
   if (std::optional<Keys> machine = root.table("machine", true)) {
     const std::size_t before = defects.count();
     walks.walker = machine->text("model", true).value_or("compass");
-    if (walks.walker != "compass" && walks.walker != "simplest")
+    if (walks.walker == own_machine)
+      machine->report(*machine->find("model", true), "model = \"none\" is a machine of your own");
+    else if (walks.walker != "compass" && walks.walker != "simplest")
       machine->report(*machine->find("model", true),
                       fmt::format("machine.model: {} is none of \"compass\", \"simplest\"", shown_text(walks.walker)));
     if (defects.count() > before) walks.no_walker = defects.lines().back();
@@ -393,7 +398,7 @@ std::optional<MachineDescription> parse_machine_toml(const std::string& file, st
   }
   told.title = root.text("title", false).value_or("");
   if (std::optional<Keys> machine = root.table("machine", true)) {
-    if (machine->text("model", true).value_or("none") != "none") {
+    if (machine->text("model", true).value_or(own_machine) != own_machine) {
       machine->report(*machine->find("model", true),
                       "machine.model: \"none\" is expected; a folder of a built-in walker is diagnosed as it is");
       return std::nullopt;

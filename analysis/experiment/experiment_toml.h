@@ -9,6 +9,7 @@
 
 #include "analysis/experiment/experiment.h"
 #include "analysis/experiment/input_error.h"
+#include "dynamics/wheel/ranges.h"
 
 namespace metastable::analysis {
 
@@ -16,6 +17,9 @@ namespace metastable::analysis {
 /// is missing, unknown, of the wrong type or out of range.
 /// @param file name for messages
 void parse_experiment_toml(const std::string& file, std::string_view text, Experiment& experiment, Defects& defects);
+
+/// The model of a machine that its user brings.
+inline constexpr const char* own_machine = "none";
 
 /// Holds what experiment.toml says of walks: which built-in walker, and what is known of it and of its sensors.
 struct WalkDescription {
@@ -31,6 +35,9 @@ struct WalkDescription {
   std::vector<std::string> labels;  ///< columns of steps.csv: a crew, a floor
   std::vector<std::pair<std::string, Spread>> launches;  ///< states, with the mean and sd of first values; often none
 };
+
+/// Returns the range of what is measured of a walker, in steps.csv and as a launch.
+dynamics::Range walk_column_range(std::string_view state);
 
 /// Reads experiment.toml of walks, `system = "machine"`. Nothing where the file states another system, or none, and
 /// where it is no TOML, which is a defect.

@@ -120,9 +120,10 @@ void add_sets_within(const RankingProblem& problem, const SingleEffects& singles
   });
   std::erase_if(found, [](const RankedCause& one) { return !one.fitted() || !std::isfinite(one.evidence); });
   // A set is worth what it earns beyond a part of it; one of which no part was fitted is not weighed.
-  for (RankedCause& one : found) one.evidence = -std::numeric_limits<double>::infinity();
+  for (RankedCause& one : found) one.evidence = std::numeric_limits<double>::infinity();
   bound_by_parts(problem, singles, set.terms.size() == 4 ? pairs : sets, found);
   std::erase_if(found, [](const RankedCause& one) { return !std::isfinite(one.evidence); });
+  finish_leading(problem, found);
   std::ranges::move(found, std::back_inserter(sets));
 }
 

@@ -45,8 +45,8 @@ double measure_last(const RankingProblem& problem, const SingleEffects& singles,
 double gain_together(const RankingProblem& problem, const SingleEffects& singles, const RankedCause& set);
 
 /// Extends the best pair, one effect after the other, as long as the last one earns its place, up to
-/// Effort::most_effects, and puts others in the place of each effect of the best set. Every set
-/// shows smaller ones, too: what stays of it without one of its effects.
+/// Effort::most_effects, and puts others in the place of each effect of the best set. Every set shows smaller ones,
+/// too: what stays of it without one of its effects.
 /// @param pairs  gets pairs that a larger set came upon
 /// @return sets of three and more
 std::vector<RankedCause> rank_larger_sets(const RankingProblem& problem, const SingleEffects& singles,

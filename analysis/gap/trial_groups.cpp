@@ -32,7 +32,7 @@ constexpr double least_weight = 1e-12;
 constexpr int drift_degree = 3;                 // of a polynomial that a break is held against
 constexpr std::size_t fewest_for_a_break = 12;  // trials
 
-struct HeapSums {
+struct GroupSums {
   double weight = 0, first = 0, second = 0;
   void add(const TrialValue& one, double sign = 1) {
     weight += sign * one.weight;
@@ -47,12 +47,15 @@ std::size_t fewest_of(std::size_t trials) {
   return std::max(fewest_in_group, static_cast<std::size_t>(std::ceil(least_share * static_cast<double>(trials))));
 }
 
-// Subtracts the mean of each condition: what a model lacks may say something else in each.
+// Subtracts the mean of each condition: what a model lacks may say something else in each. Conditions of few trials
+// are left out, because their values would next to vanish.
 std::vector<TrialValue> beside_their_condition(const TransitionModel& model, std::vector<TrialValue> values) {
   std::vector<std::size_t> condition(model.trials());
   for (const Event& event : model.events()) condition[event.trial] = event.condition;
-  std::map<std::size_t, HeapSums> sums;
-  for (const TrialValue& one : values) sums[condition[one.trial]].add(one);
+  std::map<std::size_t, GroupSums> sums;
+  std::map<std::size_t, std::size_t> trials;
+  for (const TrialValue& one : values) sums[condition[one.trial]].add(one), ++trials[condition[one.trial]];
+  std::erase_if(values, [&](const TrialValue& one) { return trials[condition[one.trial]] < fewest_in_group; });
   for (TrialValue& one : values) one.value -= sums[condition[one.trial]].mean();
   return values;
 }
@@ -158,7 +161,7 @@ std::optional<TwoGroups> split(std::vector<TrialValue> values) {
   const std::size_t n = values.size(), fewest = fewest_of(n);
   if (n < 2 * fewest) return {};
   std::ranges::sort(values, {}, &TrialValue::value);
-  HeapSums all, below, above;
+  GroupSums all, below, above;
   for (const TrialValue& one : values) all.add(one);
   above = all;
   std::size_t best = 0;
@@ -187,7 +190,7 @@ std::optional<TwoGroups> split(std::vector<TrialValue> values) {
 std::optional<TwoGroups> broken(const std::vector<TrialValue>& values) {
   const std::size_t n = values.size(), fewest = fewest_of(n);
   if (n < std::max<std::size_t>(2 * fewest, fewest_for_a_break)) return {};
-  HeapSums below, above;
+  GroupSums below, above;
   for (const TrialValue& one : values) above.add(one);
   const double all = above.weight;
   std::size_t best = 0;
@@ -237,7 +240,7 @@ std::optional<TrialGroups> trial_groups(const TransitionModel& model, const Effe
     const double p = (in_order ? break_p_value : split_p_value)(most.gain, most.sorted, seed);
     if (!(p * static_cast<double>(all.size()) < Rules::two_machines_level / 2)) continue;
     if (&chosen != &recalibrated) {
-      HeapSums left;
+      GroupSums left;
       for (const TrialValue& one : trial_values(model, along->change, without_spreads(model, chosen).score))
         left.add(one);
       if (left.weight > 0 && most.within > Rules::most_left_by_groups * left.squares()) continue;

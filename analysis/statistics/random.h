@@ -22,7 +22,7 @@ enum class DrawStream : std::uint64_t {
   blur = 5,               ///< errors added to speeds that are more exact than the law
   steps = 6,              ///< parameters of a fit, for its expected steps
   machine = 7,            ///< runs of a machine
-  trial_groups = 8        ///< trials that swing like a sine
+  trial_groups = 8        ///< values of trials without groups: normals, or those that swing like a sine
 };
 
 /// Returns the standard normals by which a bootstrap multiplies scores: those of draw number `draw`.

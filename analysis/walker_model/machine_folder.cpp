@@ -63,8 +63,9 @@ MachineRuns read_machine_folder(const std::filesystem::path& folder, const Machi
   for (const MachineSensor& sensor : machine.observe) columns.states.emplace_back(sensor.state, any_state);
   columns.inputs = machine.inputs;
   columns.labels = told->labels;
+  if (const std::string objection = label_objection(labels, columns); !objection.empty()) throw InputError({objection});
   for (const std::string& label : labels)
-    if (std::ranges::find(columns.labels, label) == columns.labels.end()) columns.labels.push_back(label);
+    if (std::ranges::find(told->labels, label) == told->labels.end()) columns.labels_of_call.push_back(label);
   MachineRuns runs;
   read_steps(source, columns, runs, defects);
   defects.check();

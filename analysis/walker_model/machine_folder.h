@@ -15,7 +15,7 @@ namespace metastable::analysis {
 /// inputs has to be what the machine says.
 /// @param labels  names of columns beside those that experiment.toml lists as `labels`
 /// @throws InputError with the first 20 defects, each with file, line and column; with one alone where the folder is
-///   another machine's
+///   another machine's, or where a label of the call is empty, there twice or another column's name
 MachineRuns read_machine_folder(const std::filesystem::path& folder, const Machine& machine,
                                 const std::vector<std::string>& labels = {});
 

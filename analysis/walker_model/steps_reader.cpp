@@ -3,11 +3,13 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <cstdint>
 #include <filesystem>
 #include <map>
 #include <optional>
+#include <set>
 #include <string_view>
 
 namespace metastable::analysis {
@@ -26,6 +28,8 @@ int index_of(std::vector<std::string>& words, std::string_view word) {
   return index;
 }
 
+constexpr std::array<std::string_view, 6> usual_columns{"condition", "trial", "step", "phase", "time_s", "position_m"};
+
 class StepsReader {
  public:
   StepsReader(const ExperimentSource& source, const StepColumns& columns, MachineRuns& runs, Defects& defects)
@@ -35,18 +39,16 @@ class StepsReader {
     runs_.conditions.clear();
     const std::string file = file_named("steps.csv");
     if (!source_.steps_csv) return defects_.add(file, {}, "there is no such file; walks need it");
-    std::vector<CsvColumn> all{{"condition"},  {"trial", true},
-                               {"step", true}, {"phase", false, columns_.legs ? phase_remedy : std::string_view()},
-                               {"time_s"},     {"position_m"}};
-    for (const auto& [state, range] : columns_.states) all.push_back({state});
-    for (const std::string& input : columns_.inputs) all.push_back({input});
-    for (const std::string& label : columns_.labels) all.push_back({label});
+    if (const std::string objection = label_objection(columns_.labels, columns_); !objection.empty())
+      return defects_.add(file_named("experiment.toml"), {}, objection);
+    for (const auto* labels : {&columns_.labels, &columns_.labels_of_call})
+      for (const std::string& label : *labels) runs_.labels.push_back({label, {}});
+    const std::vector<CsvColumn> all = csv_columns();
     CsvReader csv(file, *source_.steps_csv, all, defects_);
     for (std::size_t c = state_; c < all.size(); ++c)
       if (!csv.has(c))
-        defects_.add(file, {1, 1}, fmt::format("there is no column {}, which experiment.toml states", all[c].name));
+        defects_.add(file, {1, 1}, fmt::format("there is no column {}, which {}", all[c].name, who_names(c - state_)));
     if (columns_.legs && csv.has(phase_)) runs_.phases = {"1", "2"};
-    for (const std::string& label : columns_.labels) runs_.labels.push_back({label, {}});
     while (csv.next()) read_row(csv);
     if (runs_.trials.empty() && defects_.empty()) defects_.add(file, {}, "holds no step");
     if (source_.trials_csv) read_outcomes();
@@ -57,6 +59,28 @@ class StepsReader {
   using Key = std::pair<std::string, std::int64_t>;
 
   std::string file_named(const char* name) const { return (std::filesystem::path(source_.folder) / name).string(); }
+
+  // Lists the usual columns, then states, inputs and labels.
+  std::vector<CsvColumn> csv_columns() const {
+    std::vector<CsvColumn> all;
+    for (const std::string_view name : usual_columns) all.push_back({name});
+    all[trial_].required = all[step_].required = true;
+    if (columns_.legs) all[phase_].remedy = phase_remedy;
+    for (const auto& [state, range] : columns_.states) all.push_back({state});
+    for (const std::string& input : columns_.inputs) all.push_back({input});
+    for (const MachineLabel& label : runs_.labels) all.push_back({label.name});
+    return all;
+  }
+
+  // Says who names a column behind the usual ones. Phases of a machine that its user brings are no legs, and it has its
+  // states and inputs from the call.
+  std::string_view who_names(std::size_t column) const {
+    const std::size_t states = columns_.states.size(), inputs = states + columns_.inputs.size();
+    if (column >= inputs + columns_.labels.size()) return "labels names";
+    if (column >= inputs || columns_.legs) return "experiment.toml states";
+    return column < states ? "the machine observes" : "the machine takes";
+  }
+
   static std::string condition_of(const CsvReader& csv) {
     return csv.text(condition_).empty() ? "all" : std::string(csv.text(condition_));
   }
@@ -156,6 +180,19 @@ class StepsReader {
 };
 
 }  // namespace
+
+std::string label_objection(const std::vector<std::string>& labels, const StepColumns& columns) {
+  std::set<std::string_view> own(usual_columns.begin(), usual_columns.end()), seen;
+  for (const auto& [state, range] : columns.states) own.insert(state);
+  own.insert(columns.inputs.begin(), columns.inputs.end());
+  for (const std::string& label : labels) {
+    if (label.empty()) return "labels: a name is empty";
+    if (own.contains(label))
+      return fmt::format("labels: {} is a column of its own: a label needs another name", shown_text(label));
+    if (!seen.insert(label).second) return fmt::format("labels: {} is there twice", shown_text(label));
+  }
+  return "";
+}
 
 void read_steps(const ExperimentSource& source, const StepColumns& columns, MachineRuns& runs, Defects& defects) {
   StepsReader(source, columns, runs, defects).read();

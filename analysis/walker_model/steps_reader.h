@@ -15,10 +15,15 @@ namespace metastable::analysis {
 /// The columns of steps.csv beside condition, trial, step, phase, time_s and position_m.
 struct StepColumns {
   std::vector<std::pair<std::string, dynamics::Range>> states;  ///< measured, each with the range of its values
-  std::vector<std::string> labels = {}, inputs = {};
+  /// Labels are those that experiment.toml lists; behind them come others that the call names.
+  std::vector<std::string> labels = {}, labels_of_call = {}, inputs = {};
   bool legs = false;          ///< phases are legs, 1 and 2; else any words
   bool leg_is_input = false;  ///< the leg is an input of the step
 };
+
+/// Says what is wrong with names of labels: one that is empty, there twice, or the name of another column; empty:
+/// nothing.
+std::string label_objection(const std::vector<std::string>& labels, const StepColumns& columns);
 
 /// Checks names and types of the columns, steps of a trial in order without gap, trials that stand together, and
 /// outcomes of those trials only. Values of labels and phases have the order in which they come. What is wrong goes to

@@ -28,8 +28,6 @@ constexpr double angle_error = 0.0005, compass_rate_error = 0.005, simplest_rate
 constexpr double unknown_launch = 0.3;  // sd of a first value that is not stated, in those of the gait
 constexpr std::string_view offset_of_launch = "launch_", spread_of_launch = "launch_spread_";  // a state follows
 constexpr double least_half_angle = 0.01;  // [rad] of a launch that scatters
-constexpr dynamics::Range angles{.low = 0, .high = 1.5707963267948966, .low_open = true, .high_open = true};
-constexpr dynamics::Range rates{.low = -30, .high = 30};  // [rad/s]: ten times what gaits have; degrees are beyond
 
 std::string file_in(const ExperimentSource& source, const char* name) {
   return (std::filesystem::path(source.folder) / name).string();
@@ -37,7 +35,11 @@ std::string file_in(const ExperimentSource& source, const char* name) {
 
 // Refuses a folder that states no walker, or an unknown one, by that line alone. The walker says which states are
 // measured, so that its other defects may only seem to be some.
-void require_walker(const WalkDescription& told) {
+void require_walker(const WalkDescription& told, const std::string& folder) {
+  if (told.walker == own_machine)
+    throw InputError(
+        {fmt::format("{}: read it from Python, metastable.diagnose(metastable.runs(machine, \"{}\"), machine)",
+                     told.no_walker, folder)});
   if (!told.no_walker.empty())
     throw InputError({told.no_walker +
                       "; write model = \"compass\" or model = \"simplest\" below [machine], and bring walks of a "
@@ -202,7 +204,7 @@ std::optional<Walks> parse_walks(const ExperimentSource& source) {
     throw InputError({file_in(source, "collisions.csv") +
                       ": collisions are a wheel's, but experiment.toml states walks, whose rows are in steps.csv: give "
                       "each machine a folder of its own"});
-  if (told) require_walker(*told);
+  if (told) require_walker(*told, source.folder);
   defects.check();
   if (!told) return std::nullopt;
   WalkerStatement statement;
@@ -230,7 +232,7 @@ std::optional<Walks> parse_walks(const ExperimentSource& source) {
   Walks walks{told->title, {}, {}};
   StepColumns columns;
   for (const MachineSensor& sensor : machine->observe)
-    columns.states.emplace_back(sensor.state, sensor.state == "half_angle_rad" ? angles : rates);
+    columns.states.emplace_back(sensor.state, walk_column_range(sensor.state));
   columns.labels = told->labels;
   columns.legs = true;
   columns.leg_is_input = !machine->inputs.empty();

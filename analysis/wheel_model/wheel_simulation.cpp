@@ -110,11 +110,11 @@ struct Landing {
 DrawnCollision proposed(const Simulation& s, const Landing& at, const std::optional<ContactScores>& before,
                         const std::array<double, 3>& u) {
   const dynamics::Extension::ContactChange& e = s.hypothesis.extension.contact;
-  const double rho = e.memory, left = std::sqrt(1 - rho * rho);
+  const double rho = e.memory, fresh = std::sqrt(1 - rho * rho);
   DrawnCollision drawn{{score(u[0]), score(u[1])}, {}};
   if (rho != 0 && before) {
-    drawn.scores.restitution = rho * before->restitution + left * drawn.scores.restitution;
-    drawn.scores.friction = rho * before->friction + left * drawn.scores.friction;
+    drawn.scores.restitution = rho * before->restitution + fresh * drawn.scores.restitution;
+    drawn.scores.friction = rho * before->friction + fresh * drawn.scores.friction;
   }
   const dynamics::Contact contact{s.restitution.at_score(drawn.scores.restitution),
                                   s.friction.at_score(drawn.scores.friction)};
@@ -230,13 +230,14 @@ WheelRun drawn_run(const Simulation& s, const WheelRun& design, std::size_t inde
     before = drawn.scores;
     const bool rests = rests_after(landing, drawn);
     report(s, like, drawn, omega, rests, uniforms(s.seed ^ 0x6e6f697365ULL, index, k), m);
-    left = {s.measured.slides_seen ? drawn.landed.displacement : 0, wheel.settles() ? std::nullopt : drawn.plus};
     run.collisions.push_back(m);
     const auto next = rests ? std::nullopt : wheel.settles() ? drawn.landed.next : wheel.next(m.context, *drawn.plus);
     if (!next) {
       run.outcome = dynamics::Outcome::rest;
       break;
     }
+    left = {s.measured.slides_seen ? drawn.landed.displacement : 0,
+            wheel.settles() ? wheel.back(m.context, *next) : drawn.plus};
     omega = *next;
   }
   make_as_measured(s, design, wheel, run);

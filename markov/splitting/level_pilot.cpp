@@ -39,8 +39,7 @@ class Pilot {
     if (!(options_.level && options_.always) &&
         -std::log(ensemble_.survival()) > frequent_failures * static_cast<double>(ensemble_.steps()))
       return finish(false);
-    const std::uint64_t window = std::max(pilot_.window, revolutions(static_cast<double>(options_.window)));
-    pilot_.window = window;
+    const std::uint64_t window = pilot_.window;
     Levels levels{options_.level ? options_.level : distance_level(frames_, map_.dimension), {}};
     const std::uint64_t failed_before = ensemble_.failures(), calls_before = calls();
     std::uint64_t failed = 0;

@@ -19,7 +19,6 @@ inline constexpr double hardly_any = 1e-6;
 
 struct PilotOptions {
   LevelFunction level = {};  ///< to split by; empty: the distance from what is visited, then what is learnt
-  int window = 0;            ///< of a level that is given, the steps that a failure takes; 0: not known
   bool always = false;       ///< splits by a level that is given even where replicas fail often
   std::size_t replicas = 1000;
   std::uint64_t most_calls = 10000000;
@@ -32,7 +31,7 @@ struct LevelPilot {
   bool all_fail = false;  ///< hardly_any steps were left to expect after 64, or no walk after some: there is no regime
   double mixing_steps =
       0;  ///< after which left_of_memory is left of what is remembered of a state, by a regression of ranks
-  std::uint64_t window = 0;  ///< in which failures that begin in the middle come about [steps]
+  std::uint64_t window = 0;  ///< [steps] 1.5 mixing times; of a level that is learnt also as many as a failure takes
   std::uint64_t calls = 0;
 };
 

@@ -7,6 +7,8 @@
 #include <cmath>
 #include <memory>
 #include <optional>
+#include <stdexcept>
+#include <string>
 #include <utility>
 #include <vector>
 
@@ -14,6 +16,7 @@
 #include "markov/mesh/mesh_passage.h"
 #include "markov/mesh/mesh_study.h"
 #include "markov/mesh/study_orbit.h"
+#include "markov/parallel.h"
 
 namespace metastable::markov {
 namespace {
@@ -52,7 +55,8 @@ struct Backwards {
 };
 
 /// Finds the chance of failing within the window after which walks are about equally likely to fail next.
-Backwards follow_backwards(const Mesh& mesh, std::span<const double> start) {
+/// @param told  is called after every step backwards
+Backwards follow_backwards(const Mesh& mesh, std::span<const double> start, const std::function<void()>& told) {
   const std::vector<double> settled = mesh_passage(mesh, start, nearly_settled, 2000, true).distribution;
   std::vector<double> next(mesh.kill().begin(), mesh.kill().end()), before(mesh.size());
   Backwards found{next, 1};
@@ -60,6 +64,7 @@ Backwards follow_backwards(const Mesh& mesh, std::span<const double> start) {
     before = next;
     mesh.apply(before, next);
     for (std::size_t i = 0; i < next.size(); ++i) found.chance[i] += next[i];
+    told();
   }
   return found;
 }
@@ -82,6 +87,49 @@ struct Held {
   }
 };
 
+/// Returns the map with its rows counted and told, up to most_calls of them.
+BatchMap counted_map(const BatchMap& map, std::atomic<std::uint64_t>& calls, std::uint64_t most_calls,
+                     const std::function<void()>& told) {
+  BatchMap counted = map;
+  if (!map.step) return counted;
+  counted.step = [&map, &calls, most_calls, told](int phase, auto states, auto scores, auto next, auto failed) {
+    if ((calls += failed.size()) > most_calls && most_calls > 0)
+      throw NoSplitting(
+          fmt::format("splitting: a mesh's level would take more than {:.3g} steps of the map (a learnt level takes "
+                      "fewer): no number is given",
+                      static_cast<double>(most_calls)));
+    map.step(phase, states, scores, next, failed);
+    told();
+  };
+  return counted;
+}
+
+std::string of_the_level(const std::exception& error) { return fmt::format("a mesh's level: {}", error.what()); }
+
+/// Grows the mesh, and says of what stands in its way that it is the level's.
+std::shared_ptr<Held> grow(const BatchMap& map, std::span<const double> start, const MeshLevelOptions& options) {
+  const double spacing = options.spacing > 0 ? options.spacing : usual_spacing;
+  try {
+    const StudyOrbit around = orbit_around(map, start, spacing);
+    const BatchMap walked = around.revolutions == 1 ? map : over_revolutions(map, around.revolutions);
+    return std::make_shared<Held>(Held{Mesh(walked, around.frames, start,
+                                            {.spacing = spacing,
+                                             .seed = options.seed,
+                                             .margin = options.margin,
+                                             .score_spacing = study_score_spacing(map),
+                                             .most_bytes = options.most_bytes}),
+                                       {},
+                                       0,
+                                       around.revolutions});
+  } catch (const NoOrbit& error) {
+    throw NoOrbit(of_the_level(error));
+  } catch (const NoFailureFound& error) {
+    throw NoFailureFound(of_the_level(error));
+  } catch (const std::length_error& error) {  // too much memory
+    throw std::length_error(of_the_level(error));
+  }
+}
+
 }  // namespace
 
 MeshLevel mesh_level(const BatchMap& map, std::span<const double> start, const MeshLevelOptions& options) {
@@ -91,26 +139,10 @@ MeshLevel mesh_level(const BatchMap& map, std::span<const double> start, const M
         fmt::format("a mesh's level: the map has {} dimensions, where meshes hold 1 to {}; a learnt "
                     "level takes up to {}",
                     map.dimension, most_mesh_dimensions, most_dimensions));
-  const double spacing = options.spacing > 0 ? options.spacing : usual_spacing;
   std::atomic<std::uint64_t> calls = 0;
-  BatchMap counted = map;
-  if (map.step)
-    counted.step = [&](int phase, auto states, auto scores, auto next, auto failed) {
-      calls += failed.size();
-      map.step(phase, states, scores, next, failed);
-    };
-  const StudyOrbit around = orbit_around(counted, start, spacing);
-  const BatchMap walked = around.revolutions == 1 ? counted : over_revolutions(counted, around.revolutions);
-  const auto held = std::make_shared<Held>(Held{Mesh(walked, around.frames, start,
-                                                     {.spacing = spacing,
-                                                      .seed = options.seed,
-                                                      .margin = options.margin,
-                                                      .score_spacing = study_score_spacing(map),
-                                                      .most_bytes = options.most_bytes}),
-                                                {},
-                                                0,
-                                                around.revolutions});
-  const Backwards found = follow_backwards(held->mesh, start);
+  const auto told = one_at_a_time(options.told);
+  const std::shared_ptr<Held> held = grow(counted_map(map, calls, options.most_calls, told), start, options);
+  const Backwards found = follow_backwards(held->mesh, start, told);
   double least = 1;
   for (const double one : found.chance)
     if (one > 0) least = std::min(least, one);

@@ -4,6 +4,7 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <functional>
 #include <span>
 
 #include "markov/mesh/batch_map.h"
@@ -16,6 +17,8 @@ struct MeshLevelOptions {
   double margin = 6;   ///< MeshOptions::margin
   std::uint64_t seed = 1;
   std::size_t most_bytes = std::size_t{3} << 30;
+  std::uint64_t most_calls = 0;     ///< rows that the map may be asked for; 0: any number
+  std::function<void()> told = {};  ///< is called after every step, one call at a time; may throw to stop
 };
 
 /// Holds the logarithm of the chance that a walk fails within a window, interpolated between the nodes of a mesh; a
@@ -28,9 +31,12 @@ struct MeshLevel {
 };
 
 /// Grows one coarse mesh around the gait or walk of the start, as mesh_study() would, and no other gait. It is only a
-/// guide: what an ensemble finds does not hang on it, how surely does. Cost: some twenty steps of the map a node.
+/// guide: what an ensemble finds does not hang on it, how surely does. Cost: some twenty steps of the map a node where
+/// a step draws one noise; several stand on a lattice of scores, of which every place counts: some 250 a node for two,
+/// 10000 and more for four.
 /// @throws TooManyDimensions above most_mesh_dimensions; NoOrbit, NoFailureFound and MapError as mesh_study();
-/// std::length_error where it would take more memory than allowed; std::invalid_argument for options out of range
+/// std::length_error where it would take more memory than allowed; NoSplitting where it would take more than
+/// most_calls; std::invalid_argument for options out of range
 MeshLevel mesh_level(const BatchMap& map, std::span<const double> start, const MeshLevelOptions& options = {});
 
 }  // namespace metastable::markov

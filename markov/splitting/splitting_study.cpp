@@ -114,8 +114,11 @@ class Study {
   std::uint64_t stream(std::uint64_t number) const { return attempt_ * streams_of_an_attempt + number; }
 
   void take_level_of_mesh() {
-    tell(0);
-    MeshLevel read = mesh_level(map_, start_, {.seed = options_.seed});
+    MeshLevel read = mesh_level(map_, start_,
+                                {.seed = options_.seed,
+                                 .most_bytes = options_.level_bytes,
+                                 .most_calls = options_.most_calls / 4,
+                                 .told = [this] { tell(0); }});
     level_ = std::move(read.level), found_.level_window = read.window, found_.level_nodes = read.nodes;
     found_.pilot_calls = calls_ = read.calls;
   }

@@ -17,10 +17,11 @@ namespace metastable::markov {
 struct SplittingOptions {
   LevelFunction level = {};    ///< that ensembles are split by; empty: learnt, or a mesh's
   bool level_of_mesh = false;  ///< a mesh's (mesh_level()) instead of a learnt one, in up to four dimensions
-  std::size_t replicas = 0;    ///< of one ensemble, >= 100; 0: 1000, of a tolerance above 0.05 50 / tolerance, >= 200
-  int rounds = 16;             ///< independent ensembles, >= 8, a multiple of the pilots
-  int pilots = 4;              ///< that each learn a level of their own, >= 1
-  double tolerance = 0.05;     ///< wanted half-width of the 95 % interval of ln steps, > 0
+  std::size_t level_bytes = std::size_t{3} << 30;  ///< most memory of that mesh, which takes most_calls / 4 at most
+  std::size_t replicas = 0;  ///< of one ensemble, >= 100; 0: 1000, of a tolerance above 0.05 50 / tolerance, >= 200
+  int rounds = 16;           ///< independent ensembles, >= 8, a multiple of the pilots
+  int pilots = 4;            ///< that each learn a level of their own, >= 1
+  double tolerance = 0.05;   ///< wanted half-width of the 95 % interval of ln steps, > 0
   std::uint64_t most_calls = 400000000;  ///< rows that the map is asked for, in all
   std::uint64_t seed = 1;
   int threads = 0;             ///< 0: all cores; the bits do not depend on it
@@ -86,11 +87,11 @@ MeshEstimate survival_after(const SplittingStudy& study, std::uint64_t steps);
 /// of one ensemble fail, the rounds start anew, without levels, and walk until all of theirs have failed.
 ///
 /// No number is given where fewer than 30 independent lines lead to failure (a line is founded one to two windows
-/// before; a window is 1.5 mixing times, and as many steps as a failure takes), where the interval is wider than a
-/// factor of four, where, at a level of 0.001, rates change between the halves of the rounds or rounds split by
-/// different levels differ, and where walks have slipped into another gait (StartGait) and the share of those has not
-/// settled: it may change by less than a tenth, two standard errors included, from the end of the burn-in to that of
-/// the rounds. Maps that draw for themselves cannot be followed without noise: of these no other gait is seen.
+/// before; a window is 1.5 mixing times, of a learnt level also as many steps as a failure takes), where the interval
+/// is wider than a factor of four, where, at a level of 0.001, rates change between the halves of the rounds or rounds
+/// split by different levels differ, and where walks have slipped into another gait (StartGait) and the share of those
+/// has not settled: it may change by less than a tenth, two standard errors included, from the end of the burn-in to
+/// that of the rounds. Maps that draw for themselves cannot be followed without noise: of these no other gait is seen.
 /// @throws std::invalid_argument for options out of range; NoSplitting where no replica fails, saying after how
 /// many steps of the map; MapError as WeightedEnsemble; as mesh_level() for a mesh's level
 SplittingStudy splitting_study(const BatchMap& map, std::span<const double> start,

@@ -1,10 +1,12 @@
 #include <fmt/format.h>
 
+#include <filesystem>
 #include <sstream>
 #include <stdexcept>
 #include <string>
 #include <vector>
 
+#include "analysis/experiment/experiment_folder.h"
 #include "analysis/experiment/stand_in.h"
 #include "analysis/experiment/suggestion.h"
 #include "analysis/walker_model/walk_folder.h"
@@ -440,15 +442,23 @@ void declare_diagnose(Options& o) {
   o.add("out", "DIR", "", "Folder for index.html with figures and tables (CSV, Markdown, LaTeX)");
 }
 
+// Reads the effects to consider. Those of walks are their machine's, which is known once they are read. A folder that
+// is broken seems to be a wheel's: what is wrong with it is said first.
+std::vector<std::string> catalogue_for(const std::string& folder, const std::string& text) {
+  const bool walks = !folder.empty() && analysis::holds_walks(folder);
+  try {
+    return catalogue_value("catalogue", text, walks ? std::vector<std::string>{} : effect_ids());
+  } catch (const std::invalid_argument&) {
+    if (std::filesystem::is_directory(folder) && !analysis::read_walks(folder))
+      static_cast<void>(analysis::read_experiment(folder));
+    throw;
+  }
+}
+
 DiagnoseRequest diagnose_request(const Options& o, const std::string& line) {
   DiagnoseRequest request;
   request.folder = o.text("DIR");
-  if (o.given("catalogue")) {
-    // Effects of walks are those of their machine, which is known once they are read.
-    const bool walks = !request.folder.empty() && analysis::holds_walks(request.folder);
-    request.options.catalogue =
-        catalogue_value("catalogue", o.text("catalogue"), walks ? std::vector<std::string>{} : effect_ids());
-  }
+  if (o.given("catalogue")) request.options.catalogue = catalogue_for(request.folder, o.text("catalogue"));
   for (const char* place : {analysis::other_slope, analysis::other_launch})
     if (o.given(place)) request.options.elsewhere.emplace_back(place, o.number(place));
   request.options.seed = o.seed();

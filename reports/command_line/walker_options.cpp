@@ -14,6 +14,10 @@ constexpr dynamics::Range walker_slopes{.low = 0, .high = 45, .low_open = true, 
 constexpr dynamics::Range spacings{.low = 0.05, .high = 2};
 constexpr dynamics::Range gigabytes{.low = 0.001, .high = 1e6};
 
+std::size_t most_bytes(const Options& o) { return static_cast<std::size_t>(o.number("memory") * 0x1p30); }
+
+bool asks_for_level_of_mesh(const Options& o) { return o.given("level") && o.text("level") == "mesh"; }
+
 void refuse_what_walkers_lack(const Options& o, const std::vector<std::string>& own) {
   static const std::vector<std::string> all{"walker",          "slope",   "slopes", "slope-sd", "terrain", "memory",
                                             "simulated-steps", "spacing", "seed",   "threads",  "json",    "out"};
@@ -89,7 +93,7 @@ markov::MeshStudyOptions mesh_options(const Options& o, const std::vector<std::s
   markov::MeshStudyOptions study;
   study.seed = o.seed();
   if (o.has("threads")) study.threads = o.threads();
-  if (o.has("memory") && o.given("memory")) study.most_bytes = static_cast<std::size_t>(o.number("memory") * 0x1p30);
+  if (o.has("memory") && o.given("memory")) study.most_bytes = most_bytes(o);
   if (o.has("spacing") && o.given("spacing")) study.spacing = o.number("spacing");
   if (o.has("simulated-steps") && o.given("simulated-steps"))
     study.simulated_steps = o.whole("simulated-steps", 0, 1000000000000);
@@ -109,7 +113,9 @@ WalkerMethod walker_method(const Options& o) {
     const bool meshes = method != WalkerMethod::splitting;
     if (o.given("tolerance") && method == WalkerMethod::mesh)
       throw std::invalid_argument("--tolerance: has no meaning under --method mesh");
-    for (const char* own : {"spacing", "memory", "simulated-steps"})
+    if (!meshes && o.given("memory") && !asks_for_level_of_mesh(o))
+      throw std::invalid_argument("--memory: has no meaning under --method splitting without --level mesh");
+    for (const char* own : {"spacing", "simulated-steps"})
       if (!meshes && o.given(own))
         throw std::invalid_argument(fmt::format("--{}: has no meaning under --method splitting", own));
     return method;
@@ -122,6 +128,7 @@ markov::SplittingOptions splitting_options(const Options& o) {
   splitting.seed = o.seed();
   splitting.threads = o.threads();
   if (o.given("tolerance")) splitting.tolerance = o.number("tolerance");
+  if (o.given("memory")) splitting.level_bytes = most_bytes(o);
   return splitting;
 }
 
@@ -136,7 +143,7 @@ WalkerLevel walker_level(const Options& o, WalkerMethod method) {
   if (!o.given("level")) return WalkerLevel::learnt;
   if (method == WalkerMethod::mesh)
     throw std::invalid_argument("--level: has a meaning under --method splitting and auto only");
-  return o.text("level") == "mesh" ? WalkerLevel::mesh : WalkerLevel::learnt;
+  return asks_for_level_of_mesh(o) ? WalkerLevel::mesh : WalkerLevel::learnt;
 }
 
 WalkerRequest walker_request(const Options& o, const std::string& command_line, std::vector<std::string> own) {

@@ -79,8 +79,7 @@ void compare(const Tried& tried, std::uint64_t repetitions, std::uint64_t seed) 
   const auto& [map, start] = tried.map;
   const markov::BatchMap drawn = drawing(map);
   const markov::MeshLevel read = markov::mesh_level(map, start, {.seed = seed});
-  const markov::Levels levels =
-      markov::level_pilot(map, start, {.level = read.level, .window = read.window, .seed = seed}).levels;
+  const markov::Levels levels = markov::level_pilot(map, start, {.level = read.level, .seed = seed}).levels;
   Multilevel multilevel(map, start, levels, seed);
   std::vector<Rate> spread, plain, stages;
   for (std::uint64_t r = 1; r <= repetitions; ++r) {

@@ -239,7 +239,7 @@ def study(setting, *, method=None, cells=None, samples=None, tolerance=None, seq
                      million, 0: none, and failures that the meshes step over may go unseen
     guided_samples   of the importance sampling beside it, asked above 100 steps; None: 4000, 0: none. It takes some
                      hundred rows of a Walker's step for each
-    memory_gb        most memory of the meshes; None: 3
+    memory_gb        most memory of the meshes, that of a level too; None: 3
     level            what splitting splits by: "learnt", the chance of failing as it learns it; "mesh", that of a mesh,
                      in up to four dimensions; or, of a Walker or a Machine, level(state) -> n numbers that rise towards
                      failure, of an (n, dimension) array of states (with phases > 1 level(state, phase)); angles are

@@ -143,25 +143,36 @@ class Solution(Result):
 
 
 class WalkerSteps(MeshEstimate):
-    from_quasi_stationary: float
-    from_quasi_stationary_interval_95: Interval
+    from_quasi_stationary: Optional[float]
+    from_quasi_stationary_interval_95: Optional[Interval]
 
 
 class WalkerStudy(Result):
     setting: str
     status: str
+    method: Optional[str]
+    no_mesh: Optional[str]
     expected_steps: WalkerSteps
-    failure_rate_per_step: MeshEstimate
+    failure_rate_per_step: Optional[MeshEstimate]
     survival: Floats
-    mixing_steps: float
-    relative_errors: Record
+    survival_interval_95: Optional[Floats]
+    survival_after: Optional[Tuple[Record, ...]]
+    mixing_steps: Optional[float]
+    rounds: Optional[int]
+    steps_of_a_round: Optional[int]
+    rates_of_rounds: Optional[Tuple[float, ...]]
+    split_by: Optional[str]
+    lines_to_failure: Optional[float]
+    steps_of_the_map: Optional[int]
+    splitting: Optional[Record]
+    relative_errors: Optional[Record]
     guided_sampling: Optional[MeshEstimate]
     direct_simulation: Optional[MeshEstimate]
     no_guided_sampling: Optional[str]
     no_direct_simulation: Optional[str]
-    other_gaits: Tuple[Record, ...]
-    meshes: Tuple[Record, ...]
-    memory_bytes: float
+    other_gaits: Optional[Tuple[Record, ...]]
+    meshes: Optional[Tuple[Record, ...]]
+    memory_bytes: Optional[float]
     gait: Optional[Record]
     how_it_fails: Optional[HowItFails]
     provenance: Provenance

@@ -8,6 +8,7 @@
 #include <filesystem>
 #include <fstream>
 #include <string>
+#include <vector>
 
 #include "analysis/experiment/input_error.h"
 #include "analysis/walker_model/walk_folder.h"
@@ -69,6 +70,37 @@ TEST_F(MachineFolder, LabelsMayBeNamedInTheCall) {
   const std::string message = message_of<InputError>([&] { read_machine_folder(folder_, machine_); });
   EXPECT_NE(message.find("steps.csv:1:"), std::string::npos) << message;
   EXPECT_NE(message.find("crew"), std::string::npos) << message;
+}
+
+TEST_F(MachineFolder, LabelsHaveNamesOfTheirOwn) {
+  const auto called = [&](const std::vector<std::string>& labels) {
+    return message_of<InputError>([&] { read_machine_folder(folder_, machine_, labels); });
+  };
+  const auto stated = [&](const std::string& labels) {
+    return refused("system = \"machine\"\n[machine]\nmodel = \"none\"\nlabels = " + labels + "\n");
+  };
+  const std::string file = (folder_ / "experiment.toml").string() + ": ";
+  for (const std::string own : {"x", "load_kg", "trial", "condition", "phase"}) {
+    const std::string said = "labels: '" + own + "' is a column of its own: a label needs another name";
+    EXPECT_EQ(called({own}), said);
+    EXPECT_EQ(stated("[\"" + own + "\"]"), file + said);
+    put("experiment.toml", toml_);
+  }
+  EXPECT_EQ(called({"a", "a"}), "labels: 'a' is there twice");
+  EXPECT_EQ(called({""}), "labels: a name is empty");
+  EXPECT_EQ(stated("[\"a\", \"a\"]"), file + "labels: 'a' is there twice");
+  EXPECT_EQ(stated("[\"\"]"), file + "labels: a name is empty");
+}
+
+TEST_F(MachineFolder, AMissingColumnIsOfWhoeverNamesIt) {
+  const auto message = [&](const std::vector<std::string>& labels) {
+    return message_of<InputError>([&] { read_machine_folder(folder_, machine_, labels); });
+  };
+  const std::string place = (folder_ / "steps.csv").string() + ":1:1: there is no column ";
+  EXPECT_EQ(message({"crew", "floor"}), place + "floor, which labels names");
+  put("steps.csv", "trial,step\n1,1\n");
+  EXPECT_EQ(message({}), place + "x, which the machine observes\n" + place + "load_kg, which the machine takes\n" +
+                             place + "crew, which experiment.toml states");
 }
 
 TEST_F(MachineFolder, AnotherMachinesFolderIsRefusedInOneLine) {

@@ -105,7 +105,7 @@ TEST_F(WalkFolder, WhatIsWrongIsNamedWithItsPlace) {
 }
 
 TEST_F(WalkFolder, WithoutAKnownModelOneSentenceSaysWhatToWrite) {
-  for (const char* stated : {"model = \"none\"\n", ""}) {
+  for (const char* stated : {"model = \"biped\"\n", ""}) {
     WalkFiles files = drawn();
     const std::string was = "model = \"compass\"\n";
     files.experiment_toml.replace(files.experiment_toml.find(was), was.size(), stated);
@@ -115,6 +115,32 @@ TEST_F(WalkFolder, WithoutAKnownModelOneSentenceSaysWhatToWrite) {
         << message;
     EXPECT_EQ(message.find('\n'), std::string::npos) << message;
   }
+}
+
+TEST_F(WalkFolder, AMachineOfOnesOwnIsSaidToBeReadFromPython) {
+  put("experiment.toml", "system = \"machine\"\n[machine]\nmodel = \"none\"\n");
+  put("steps.csv", "trial,step,x\n1,1,1.5\n");
+  EXPECT_EQ(refused(), (folder_ / "experiment.toml").string() +
+                           ":3:9: model = \"none\" is a machine of your own: read it from Python, "
+                           "metastable.diagnose(metastable.runs(machine, \"" +
+                           folder_.string() + "\"), machine)");
+}
+
+TEST_F(WalkFolder, LabelsHaveNamesOfTheirOwn) {
+  const auto with = [&](const std::string& labels) {
+    WalkFiles files = drawn();
+    const std::string model = "model = \"compass\"\n";
+    files.experiment_toml.insert(files.experiment_toml.find(model) + model.size(), "labels = " + labels + "\n");
+    write(files);
+    return refused();
+  };
+  const std::string file = (folder_ / "experiment.toml").string() + ": labels: ";
+  for (const char* own : {"half_angle_rad", "condition", "trial", "step", "phase", "time_s", "position_m"})
+    EXPECT_EQ(with("[\"" + std::string(own) + "\"]"),
+              file + "'" + own + "' is a column of its own: a label needs another name");
+  EXPECT_EQ(with("[\"a\", \"a\"]"), file + "'a' is there twice");
+  EXPECT_EQ(with("[\"\"]"), file + "a name is empty");
+  EXPECT_NE(with("[\"floor\"]").find("there is no column floor, which experiment.toml states"), std::string::npos);
 }
 
 TEST_F(WalkFolder, CollisionsBesideStepsAreAnotherMachines) {
@@ -176,6 +202,13 @@ TEST_F(WalkFolder, ALaunchIsReadAndItsDefectsAreNamed) {
   EXPECT_EQ(walks.machine->stated_launch("half_angle_rad"), nullptr) << "the gait's is assumed";
   with("[launch]\nstance_rate_rad_s = { mean = -1.1, sd = -0.02 }\n");
   EXPECT_NE(refused().find("launch.stance_rate_rad_s.sd: -0.02 is outside [0, 30]"), std::string::npos) << refused();
+  with("[launch]\nstance_rate_rad_s = { mean = -1.1, sd = 50 }\n");
+  EXPECT_NE(refused().find("launch.stance_rate_rad_s.sd: 50 is outside [0, 30]"), std::string::npos) << refused();
+  for (const char* mean : {"-0.27", "0", "1.6"}) {
+    with(std::string("[launch]\nhalf_angle_rad = { mean = ") + mean + ", sd = 0.02 }\n");
+    const std::string said = std::string("launch.half_angle_rad.mean: ") + mean + " is outside (0, 1.5708)";
+    EXPECT_NE(refused().find(said), std::string::npos) << refused();
+  }
   with("[launch]\nstance_rate = { mean = -1.1, sd = 0.02 }\n");
   EXPECT_NE(refused().find("unknown key 'stance_rate' in launch"), std::string::npos) << refused();
 }

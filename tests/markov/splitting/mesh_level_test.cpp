@@ -2,11 +2,15 @@
 
 #include "markov/splitting/mesh_level.h"
 
+#include <fmt/format.h>
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <stdexcept>
+#include <string>
 #include <vector>
 
+#include "markov/mesh/mesh.h"
 #include "markov/mesh/noise_frame.h"
 #include "markov/splitting/splitting_study.h"
 #include "tests/markov/mesh/maps.h"
@@ -84,6 +88,52 @@ TEST(MeshLevel, WantsAMapThatMeshesTake) {
   five.dimension = 5, five.names = {};
   EXPECT_THROW(mesh_level(five, std::vector<double>(5, 0)), TooManyDimensions);
   EXPECT_THROW(mesh_level(Ladder{}.drawing(), std::vector{0.0}), MapError);
+}
+
+std::string refusal(const BatchMap& map, const MeshLevelOptions& options) {
+  try {
+    mesh_level(map, std::vector{2.0}, options);
+  } catch (const NoSplitting& error) {
+    return fmt::format("no number: {}", error.what());
+  } catch (const NoFailureFound& error) {
+    return fmt::format("no failure: {}", error.what());
+  } catch (const std::length_error& error) {
+    return fmt::format("memory: {}", error.what());
+  }
+  return "";
+}
+
+TEST(MeshLevel, EndsWhereItWouldTakeMoreThanIsAllowed) {
+  const BatchMap map = linear_batch(0.4);
+  const MeshLevel read = mesh_level(map, std::vector{2.0});
+  EXPECT_EQ(refusal(map, {.most_calls = read.calls}), "");
+  EXPECT_EQ(refusal(map, {.most_calls = 100}),
+            "no number: splitting: a mesh's level would take more than 100 steps of the map (a learnt level takes "
+            "fewer): no number is given");
+  EXPECT_TRUE(refusal(map, {.most_bytes = 100}).starts_with("memory: a mesh's level: mesh: spacing 1 takes more than"));
+  EXPECT_THROW(splitting_study(map, std::vector{2.0}, {.level_of_mesh = true, .level_bytes = 100}), std::length_error);
+  EXPECT_THROW(splitting_study(map, std::vector{2.0}, {.level_of_mesh = true, .most_calls = 400}), NoSplitting);
+}
+
+TEST(MeshLevel, SaysThatItFindsNoFailure) {
+  BatchMap map = linear_batch(0.4);
+  map.step = [step = map.step](int phase, auto states, auto scores, auto next, auto failed) {
+    step(phase, states, scores, next, failed);
+    for (std::size_t i = 0; i < failed.size(); ++i)
+      if (failed[i]) failed[i] = 0, next[i] = 0;
+  };
+  EXPECT_TRUE(refusal(map, {}).starts_with("no failure: a mesh's level: return map: no failure is found within"));
+}
+
+TEST(MeshLevel, TellsOfItsSteps) {
+  struct Stopped {};
+  int told = 0;
+  mesh_level(linear_batch(0.4), std::vector{2.0}, {.told = [&] { ++told; }});
+  EXPECT_GT(told, 3);
+  const auto stop = [&] {
+    if (--told == 0) throw Stopped();
+  };
+  EXPECT_THROW(mesh_level(linear_batch(0.4), std::vector{2.0}, {.told = stop}), Stopped);
 }
 
 const SplittingOptions by_mesh{

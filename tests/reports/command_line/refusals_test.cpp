@@ -171,6 +171,8 @@ TEST_F(Refusals, OfWrongWordsHintAtTheNearest) {
        "--method: 'sampled' is none of mesh, splitting, auto, which walkers have"},
       {{"steps", "--walker", "compass", "--slope-sd", "1", "--method", "splitting", "--spacing", "1"},
        "--spacing: has no meaning under --method splitting"},
+      {{"steps", "--walker", "compass", "--slope-sd", "1", "--method", "splitting", "--memory", "1"},
+       "--memory: has no meaning under --method splitting without --level mesh"},
       {{"steps", "--walker", "compass", "--slope-sd", "1", "--tolerance", "0.1"},
        "--tolerance: has a meaning under --method splitting only"},
       {{"steps", "--walker", "compass", "--slope-sd", "1", "--level", "mesh"},

@@ -105,6 +105,18 @@ TEST_F(DiagnoseCommand, NamesTheKnownEffects) {
     EXPECT_NE(ran.err.find(part), std::string::npos) << part << "\n" << ran.err;
 }
 
+// A folder that is broken is no wheel's, of whose effects a catalogue could be.
+TEST_F(DiagnoseCommand, ABrokenFolderIsSaidBeforeItsCatalogue) {
+  std::filesystem::create_directories(path("walks"));
+  std::ofstream(path("walks/experiment.toml")) << "system = \"machine\"\n[machine\nmodel = \"compass\"\n";
+  std::ofstream(path("walks/steps.csv")) << "trial,step,half_angle_rad\n1,1,0.27\n";
+  const Ran all = metastable({"diagnose", path("walks")});
+  const Ran some = metastable({"diagnose", path("walks"), "--catalogue", "impact_loss"});
+  EXPECT_EQ(some.code, 2);
+  EXPECT_EQ(some.err, all.err);
+  EXPECT_NE(some.err.find("experiment.toml:2:"), std::string::npos) << some.err;
+}
+
 // The diagnosis leaves out an effect that the contact law cannot have, and lists it with the reason. It refuses a
 // catalogue of which no effect is left.
 TEST_F(DiagnoseCommand, SaysWhichEffectsTheModelCannotHave) {

@@ -297,6 +297,21 @@ class Folder(unittest.TestCase):
         self.assertEqual(one.verdict, other.verdict)
         self.assertEqual(str(one.at_work), str(other.at_work))
 
+    def test_a_label_has_a_name_of_its_own(self):
+        self.put("experiment.toml", 'system = "machine"\n[machine]\nmodel = "none"\n')
+        self.put("steps.csv", "trial,step,swing_rad\n1,1,0.5\n")
+        for label, sentence in (("swing_rad", "^labels: 'swing_rad' is a column of its own: a label needs another"),
+                                ("trial", "^labels: 'trial' is a column of its own: a label needs another name"),
+                                ("crew", "there is no column crew, which labels names")):
+            with self.assertRaisesRegex(metastable.InputError, sentence):
+                metastable.runs(pendulum(), self.folder.name, labels=[label])
+
+    def test_without_its_machine_the_way_is_named(self):
+        self.put("experiment.toml", 'system = "machine"\n[machine]\nmodel = "none"\n')
+        self.put("steps.csv", "trial,step,swing_rad\n1,1,0.5\n")
+        with self.assertRaisesRegex(metastable.InputError, r"from Python, metastable\.diagnose\(metastable\.runs"):
+            metastable.diagnose(self.folder.name)
+
     def test_another_machines_is_refused(self):
         self.put("experiment.toml", 'system = "machine"\n[machine]\nmodel = "compass"\n')
         self.put("steps.csv", "trial,step,swing_rad\n1,1,0.5\n")

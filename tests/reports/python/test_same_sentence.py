@@ -32,7 +32,7 @@ elsewhere = {command: names | {f"{name}-se" for name in ("slope", "restitution",
 
 wheel = dict(slope_deg=9.59)
 walker = dict(walker="simplest", slope_sd_deg=0.5)
-of_walkers = {"walker", "slope-sd", "terrain", "spacing", "simulated-steps", "memory"}
+of_walkers = {"walker", "slope-sd", "terrain", "spacing", "simulated-steps", "memory", "level"}
 
 
 def argument_of(option):

@@ -100,7 +100,8 @@ class Stubs(unittest.TestCase):
         for result, name in (
             (plain, "Study"), (plain.expected_steps, "ExpectedSteps"), (plain.provenance, "Provenance"),
             (plain.regime[0], "Regime"), (mesh, "WalkerStudy"), (mesh.failure_rate_per_step, "MeshEstimate"),
-            (several, "WalkerComparison"), (metastable.compare([setting, setting], **small), "Comparison"),
+            (drum.study(method="splitting", tolerance=0.3), "WalkerStudy"), (several, "WalkerComparison"),
+            (metastable.compare([setting, setting], **small), "Comparison"),
             (metastable.simulate(metastable.Setting(law="plastic"), trials=3), "Experiment"),
             (metastable.describe(metastable.simulate(metastable.Setting(law="plastic"), trials=3)), "Description"),
             (metastable.diagnose(trials, catalogue="slope_offset"), "Diagnosis"),
