@@ -10,6 +10,7 @@
 #include "analysis/blind/at_work_grade.h"
 #include "analysis/blind/sized_effect.h"
 #include "analysis/blind/sized_walker_effect.h"
+#include "analysis/diagnosis/diagnosis_sentences.h"
 #include "analysis/statistics/interval_95.h"
 #include "dynamics/catalogue/walker_effects.h"
 
@@ -26,13 +27,6 @@ bool contains(const std::vector<std::string>& list, const std::string& one) {
 }
 
 std::string joined(const std::string& a, const std::string& b) { return a + "+" + b; }
-
-// Lists the effects a name stands for: "a" or "a+b".
-std::vector<std::string> members(const std::string& name) {
-  const auto plus = name.find('+');
-  if (plus == std::string::npos) return {name};
-  return {name.substr(0, plus), name.substr(plus + 1)};
-}
 
 using Answer = std::optional<BlindAnswer>;
 
@@ -157,7 +151,7 @@ void count_pair(Tally& tally, const BlindTruth& truth, const Answer& answer) {
     tally.both_findable.count(named_both);
   if (!is(answer, Verdict::explained) || answer->cause_set.empty()) return;
   const auto of_the_two = [&](const std::string& name) {
-    const std::vector<std::string> named = members(name);
+    const std::vector<std::string> named = effects_of_cause(name);
     return std::all_of(named.begin(), named.end(), [&](const std::string& id) { return id == a || id == b; });
   };
   tally.no_third.count(std::any_of(answer->cause_set.begin(), answer->cause_set.end(), of_the_two));
@@ -192,7 +186,7 @@ Groups ambiguity_groups(const std::vector<BlindTruth>& truths, const std::vector
       const std::string& id = truths[i].effects.front().id;
       ++sets[id];
       for (const std::string& name : answers[i]->cause_set)
-        if (name != id && members(name).size() == 1) ++together[id][name];
+        if (name != id && effects_of_cause(name).size() == 1) ++together[id][name];
     }
   Groups alike;
   for (const auto& [id, others] : together)
@@ -205,7 +199,7 @@ Groups ambiguity_groups(const std::vector<BlindTruth>& truths, const std::vector
 std::vector<std::string> named_by(const std::string& way, const BlindAnswer& answer) {
   if (const auto found = answer.stepwise.find(way); found != answer.stepwise.end()) return found->second;
   if (answer.cause_set.empty() || !is_gap(answer.verdict)) return {};
-  return members(answer.cause_set.front());
+  return effects_of_cause(answer.cause_set.front());
 }
 
 void count_way(WayGrade& grade, const BlindTruth& truth, const std::vector<std::string>& named) {

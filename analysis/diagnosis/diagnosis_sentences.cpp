@@ -29,20 +29,11 @@ std::string with_parameters(const Cause& cause) {
   return text;
 }
 
-std::vector<std::string> parts_of(const std::string& cause) {
-  std::vector<std::string> effects;
-  for (std::size_t from = 0, plus = 0; plus != std::string::npos; from = plus + 1) {
-    plus = cause.find('+', from);
-    effects.push_back(cause.substr(from, plus - from));
-  }
-  return effects;
-}
-
 // Lists the set, what acts alike as one group beside what all of that group hold.
 std::string grouped_set(const Diagnosis& d) {
   if (d.causes.alike.empty()) return fmt::format("{}", fmt::join(d.causes.set, ", "));
   std::vector<std::vector<std::string>> group;
-  for (const std::string& name : d.causes.alike) group.push_back(parts_of(name));
+  for (const std::string& name : d.causes.alike) group.push_back(effects_of_cause(name));
   std::vector<std::string> common = d.causes.ranked.front().effects, own;
   std::erase_if(common, [&](const std::string& effect) {
     return !std::ranges::all_of(group, [&](const auto& one) { return std::ranges::find(one, effect) != one.end(); });
@@ -302,6 +293,15 @@ std::string taken_out_of(const std::vector<std::string>& effects) {
 
 }  // namespace
 
+std::vector<std::string> effects_of_cause(const std::string& name) {
+  std::vector<std::string> effects;
+  for (std::size_t from = 0, plus = 0; plus != std::string::npos; from = plus + 1) {
+    plus = name.find('+', from);
+    effects.push_back(name.substr(from, plus - from));
+  }
+  return effects;
+}
+
 std::string common_name(const std::vector<EffectGroup>& groups, const std::vector<std::string>& alike) {
   for (const EffectGroup& group : groups)
     if (std::ranges::all_of(
@@ -353,7 +353,7 @@ std::string next_step(const Diagnosis& d) {
         return fmt::format(
             "Give the model {} with the parameters under “Which effect”, or take it out of {}; "
             "new trials should then leave no gap.",
-            d.causes.set.front(), taken_out_of(parts_of(d.causes.set.front())));
+            d.causes.set.front(), taken_out_of(effects_of_cause(d.causes.set.front())));
       if (!d.limits.next.empty())
         return fmt::format(
             "Tell the causes apart before changing the model: {} would do it best{} (“The next experiment”).",

@@ -21,6 +21,9 @@ bool closed_is_known(const Shrinkage& shrinkage);
 /// Says "not known: 90 % interval −141 to 142 %, wider than the gap" of a share that is not.
 std::string closed_unknown(const Shrinkage& shrinkage);
 
+/// Lists the effects that the name of a cause stands for: of "a+b+c" a, b and c.
+std::vector<std::string> effects_of_cause(const std::string& name);
+
 /// Names what effects that act alike have in common, where the field has a word for it.
 std::string common_name(const std::vector<EffectGroup>& groups, const std::vector<std::string>& alike);
 

@@ -47,13 +47,12 @@ Table measures(const analysis::BlindGrades& grades, const std::string& law, cons
 
 // Shows stepwise selection beside the diagnosis.
 Table ways(const analysis::BlindGrades& grades, const Provenance& provenance) {
-  Table table{
-      .id = "blind-stepwise",
-      .title = "The diagnosis beside stepwise selection over the same models",
-      .notes = {"Forward selection from the recalibrated model, at most two effects, each chosen entry of a list "
-                "(a leg, an interval) counted as a parameter; cases that were answered."},
-      .columns = {{"way"}, {"what it names"}, {"cases"}, {"of"}, {"share"}},
-      .provenance = provenance};
+  Table table{.id = "blind-stepwise",
+              .title = "The diagnosis beside stepwise selection over the same models",
+              .notes = {"Forward selection from the recalibrated model, each chosen entry of a list "
+                        "(a leg, an interval) counted as a parameter; cases that were answered."},
+              .columns = {{"way"}, {"what it names"}, {"cases"}, {"of"}, {"share"}},
+              .provenance = provenance};
   for (const analysis::WayGrade& way : grades.ways)
     for (const auto& [what, count] :
          {std::pair<const char*, const analysis::Proportion&>{"something, where there is no gap", way.alarms},

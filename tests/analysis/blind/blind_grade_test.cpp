@@ -156,6 +156,14 @@ TEST(BlindGrade, StepwiseSelectionIsSetBesideTheDiagnosis) {
   EXPECT_EQ(counts(bic), (std::vector<int>{0, 1, 1, 0, 0, 0, 1}));
 }
 
+TEST(BlindGrade, ThreeEffectsAreCountedAsThree) {
+  const BlindTruth three = truth(BlindKind::many, {"bounce", "inertia", "trial_drift"}, 2);
+  const BlindGrades g = grade({three, three}, {said(Verdict::explained, {"inertia+bounce+trial_drift"}),
+                                               said(Verdict::explained, {"inertia+bounce"})});
+  EXPECT_EQ(g.ways[0].three.right, 1);
+  EXPECT_EQ(g.ways[0].two_of_three.right, 2);
+}
+
 TEST(BlindGrade, AnswersMustBeAsManyAsTruths) { EXPECT_THROW(grade({BlindTruth{}}, {}), std::invalid_argument); }
 
 // Counts of 300 rests in 30,000 collisions are 100 expected steps; intervals are as wide as their ends' ratio.
