@@ -116,8 +116,8 @@ struct Rules {
   /// normals about a smooth drift.
   static constexpr double two_machines_level = 0.01;
   /// Share of the trials' scatter under the likeliest hypothesis that two groups may leave. Convention: two thirds.
-  /// What accounts for the groups as they do leaves as much; a drift that takes up a step of four sds leaves twice as
-  /// much.
+  /// A hypothesis that accounts for the groups leaves about as much as they do; a drift that is fitted to a step of four
+  /// sds leaves twice as much.
   static constexpr double most_left_by_groups = 0.67;
 
   /// Says whether hypotheses are fitted and weighed alike under other rules.

@@ -11,7 +11,7 @@
 
 namespace metastable::analysis {
 
-/// What a trial says of one parameter by itself: its value, from the trial's scores, and the information behind it.
+/// Holds one parameter as a single trial's scores tell it: its value, and the information behind it.
 struct TrialValue {
   std::size_t trial = 0;
   double value = 0, weight = 0;

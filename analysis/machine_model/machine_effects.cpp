@@ -280,7 +280,7 @@ MachineCandidate sensor_bias(const Machine& machine, const MachineDesign& design
   return one;
 }
 
-// What the launch of a state is held against.
+// Holds the stated launch of a state beside the first values that were measured of it.
 struct LaunchSeen {
   const MachineLaunch* stated;  // nullptr: nobody stated it
   bool measured;

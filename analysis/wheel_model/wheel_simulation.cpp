@@ -64,7 +64,7 @@ Launch drawn_launch(const Simulation& s, const WheelRun& design, std::size_t ind
   return {std::max(0.1, launch->mean + e.sensor.launch_shift + sd * score(first[1])), shift};
 }
 
-// What the last collision left: how far its foot slid [m], and omega+ [rad/s], where that is known.
+// Holds how far the foot of the last collision slid [m], and its omega+ [rad/s], where that is known.
 struct Left {
   double slid = 0;
   std::optional<double> plus;

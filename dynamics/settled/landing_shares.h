@@ -22,8 +22,8 @@ struct LandingShares {
   struct Drag {
     double carried_squared = 0;
     std::array<double, 3> lost{};
-    /// What they add to mu_r, because more friction has to stop a foot that slides while they slow the wheel: per
-    /// torque, [1/(N m)], by omega [1/(N m s)], by omega^2 [1/(N m s^2)].
+    /// Torques raise mu_r by so much, because a foot that slides while they slow the wheel needs more friction to stop:
+    /// per constant torque [1/(N m)], by omega [1/(N m s)], by omega^2 [1/(N m s^2)].
     std::array<double, 3> resting{};
   };
   struct Leg {

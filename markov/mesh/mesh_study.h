@@ -55,8 +55,8 @@ struct MeshStudy {
   double cheapest_failure = 0;
   NoiseFreeOrbit orbit;  ///< of a gait that comes back after several revolutions, over all of them
   int period = 1;        ///< revolutions after which the gait comes back; 0: there is none, `orbit` has no eigenvalues
-  /// Where there is no gait that meshes hold (longest_period), the revolutions after which an orbit comes back; 0: none
-  /// does.
+  /// The orbit without noise comes back after so many revolutions, more than a mesh holds (longest_period); 0: it does
+  /// not, or a mesh holds the gait.
   int longer_period = 0;
   std::uint64_t fails_without_noise = 0;  ///< where there is no gait, the steps after which that is; 0: never
   std::vector<NoiseFrame> frames;         ///< of the meshes, phase by phase

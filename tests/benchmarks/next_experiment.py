@@ -35,13 +35,18 @@ def effect(name, table, dice):
     return f"{name}:{key}={(1 if name in RATIOS else 0) + size:.6g}"
 
 
-def draw_case(seed, law):
-    dice = random.Random(seed)
+def draw_effects(dice):
     names = [dice.choice(sorted(FIRST))]
     effects = [effect(names[0], FIRST, dice)]
     if dice.random() < 0.5:
         names.append(dice.choice(sorted(SECOND)))
         effects.append(effect(names[1], SECOND, dice))
+    return names, effects
+
+
+def draw_case(seed, law):
+    dice = random.Random(seed)
+    names, effects = draw_effects(dice)
     return {"names": names, "effects": effects, "law": law, "slope_deg": dice.choice([8.0, 9.59]), "launch_rad_s": 5.5,
             "collisions": 10, "drop": dice.random() < 0.7}
 

@@ -16,7 +16,7 @@ import random
 import subprocess
 import tempfile
 
-from next_experiment import FIRST, SECOND, effect
+from next_experiment import draw_effects
 
 HERE = {"slope": 9.59, "speed": 5.5}
 
@@ -40,12 +40,7 @@ def counted(folder):
 
 def run_case(program, law, seed):
     dice = random.Random(seed)
-    names = [dice.choice(sorted(FIRST))]
-    effects = [effect(names[0], FIRST, dice)]
-    if dice.random() < 0.5:
-        names.append(dice.choice(sorted(SECOND)))
-        effects.append(effect(names[1], SECOND, dice))
-    case = {"law": law, "effects": effects}
+    case = {"law": law, "effects": draw_effects(dice)[1]}
     there = dict(HERE)
     if dice.random() < 0.5:
         there["slope"] += dice.choice([-1.2, -0.6, 0.6])
@@ -65,14 +60,14 @@ def run_case(program, law, seed):
         _, rests_here = counted(folder)
     steps = [one for one in said["steps_before_failure"]["machine"] if one["where"] != "as measured"]
     if not steps or rests < 30:
-        return f"{effects}, {' '.join(asked)}: {said['verdict']}, {rests} rests there, not judged", None
+        return f"{case['effects']}, {' '.join(asked)}: {said['verdict']}, {rests} rests there, not judged", None
     low, high = (math.inf if end == "infinite" else end for end in steps[0]["interval_90"])
     truth = collisions / rests
     spread = 1 / math.sqrt(rests)  # the count's own error
     holds = low * (1 - spread) <= truth <= high * (1 + spread)
     width = math.log(high / low) if math.isfinite(high) else math.inf
     of_count = 2 * 1.645 / math.sqrt(max(1, rests_here))
-    return (f"{effects}, {' '.join(asked)}: {said['verdict']}, {low:.3g} to {high:.3g}, counted {truth:.3g} "
+    return (f"{case['effects']}, {' '.join(asked)}: {said['verdict']}, {low:.3g} to {high:.3g}, counted {truth:.3g} "
             f"({rests} rests; {rests_here} here){'' if holds else ', MISSED'}"), (holds, width / of_count)
 
 

@@ -183,6 +183,8 @@ class Runs:
         phase, phases = (numpy.full(rows, -1), []) if find("phase") is None else _ranked(find("phase"), "phase", rows)
         label_index, label_values = [], {}
         for name in _words(labels if not isinstance(labels, dict) else labels.keys(), "labels"):
+            if name in label_values:
+                raise InputError(f"labels: '{name}' is there twice")
             values = labels[name] if isinstance(labels, dict) else _column(data, name)
             if values is None:
                 raise InputError(f"labels: there is no column {name}")

@@ -129,7 +129,7 @@ TEST(LaboratoryAgreement, ExpectedStepsAreThoseCounted) {
       expect_steps(base, effect, 800);
 }
 
-// What contacts remember changes how often a wheel comes to rest at a speed, and a ramp that rings is in another phase
+// A wheel whose contacts remember rests more often or less at the same speed, and a ramp that rings is in another phase
 // where the wheel is slower.
 TEST(LaboratoryAgreement, ExpectedStepsKnowWhatTheCollisionBeforeWas) {
   const Setting base = slow_launches(stand_in_setting(), 7.02, 5.5);

@@ -97,7 +97,8 @@ TEST(MachineSteps, AModelThatLacksEverythingLeavesTheCountAlone) {
   EXPECT_LT(e.upper, 1.4 / quantile(rate, 0.05));
 }
 
-// What a model leaves out multiplies its steps: by its prior where few failures were counted, else by what they say.
+// The steps of a model that leaves something out are a multiple of the machine's: its prior says which where few
+// failures were counted, else the count does.
 TEST(MachineSteps, TheCostOfIgnoringIsWhatTheCountSaysOfTheModel) {
   const std::vector<double> draws(10, 300.0);
   const Estimate few = steps_of_model_by_machine(draws, {0.5, 0}, 0, 0);

@@ -2,9 +2,12 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <cmath>
+#include <vector>
 
 #include "analysis/diagnosis/diagnosis.h"
 #include "analysis/experiment_model/experiment_model.h"
+#include "analysis/fitting/model_fit.h"
 #include "tests/analysis/diagnosed.h"
 #include "tests/analysis/experiment_model/engine_wheel.h"
 
@@ -49,6 +52,25 @@ TEST(EngineDiagnosis, ADragAtTheAxleIsInTheSetWithItsSize) {
   ASSERT_NE(drag, d.causes.ranked.end());
   EXPECT_NE(std::ranges::find(d.causes.set, drag->name()), d.causes.set.end());
   EXPECT_NEAR(parameter(drag->parameters.front(), "n_m_s").value, 0.004, 0.0006);
+}
+
+// Compares the steps before rest that the model with an effect expects with the engine's count.
+void expect_steps(const metastable::test::EngineRun& run, const char* effect, double size) {
+  const auto model = transition_model(metastable::test::engine_experiment(run));
+  const EffectTerm term = test::term(*model, effect, {}, {size});
+  const double expected = model->expected_steps(nominal_values(*model), std::vector{term}, 1);
+  const auto [at_risk, rests] = model->rests();
+  EXPECT_NEAR(std::log(expected * rests / at_risk), 0, 3.5 / std::sqrt(rests)) << effect << ": " << rests << " rests";
+}
+
+// A torque at the axle makes feet slide further, so that a friction which stops them without it does not stop them.
+TEST(EngineDiagnosis, TorquesMakeTheWheelRestAsOftenAsTheModelSays) {
+  expect_steps({.trials = 60, .seed = 5, .viscous_drag = 0.016}, "axle_drag_viscous", 0.016);
+}
+
+// Two minutes, so that it is run by hand: fewer trials do not tell a wheel that remembers from one that forgets.
+TEST(EngineDiagnosis, DISABLED_FootholdsThatRememberMakeItRestAsOftenAsTheModelSays) {
+  expect_steps({.trials = 300, .seed = 7, .memory = 0.8}, "contact_memory", 0.8);
 }
 
 }  // namespace

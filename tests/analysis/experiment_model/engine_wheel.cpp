@@ -106,10 +106,13 @@ class World {
 
  private:
   void draw(int leg) {
-    std::normal_distribution<double> score;
+    std::normal_distribution<double> fresh;
+    for (double& score : scores_)
+      score = drawn_ ? run_.memory * score + std::sqrt(1 - run_.memory * run_.memory) * fresh(random_) : fresh(random_);
+    drawn_ = true;
     const auto k = static_cast<std::size_t>(leg);
-    restitution_[k] = std::clamp(0.4 + 0.05 * score(random_), 0.0, 1.0);
-    friction_[k] = std::max(0.0, 0.4 + 0.03 * score(random_)) * (leg == run_.odd_leg ? run_.friction_ratio : 1);
+    restitution_[k] = std::clamp(0.4 + 0.05 * scores_[0], 0.0, 1.0);
+    friction_[k] = std::max(0.0, 0.4 + 0.03 * scores_[1]) * (leg == run_.odd_leg ? run_.friction_ratio : 1);
   }
 
   // Gives the engine a contact for every tip in the ground, and takes down the first touch of the leg that comes next.
@@ -156,6 +159,8 @@ class World {
   dJointGroupID contacts_ = nullptr;
   dBodyID body_ = nullptr;
   std::array<double, legs> tip_x_{}, tip_y_{}, restitution_{}, friction_{};
+  std::array<double, 2> scores_{};  // of restitution and friction at the foothold drawn last
+  bool drawn_ = false;
   int next_ = 1;
   bool touching_ = false;
   bool open_ = false;  // the foot that landed last has not left the ground again

@@ -15,6 +15,7 @@ struct EngineRun {
   double viscous_drag = 0;  ///< at the axle [N m s]
   int odd_leg = -1;         ///< whose friction is multiplied by friction_ratio; -1: none
   double friction_ratio = 1;
+  double memory = 0;  ///< correlation of restitution, and of friction, between one foothold and the next
 };
 
 /// Steps the engine 20,000 times a second and writes down what a perfect sensor sees: the speed when a tip touches, the

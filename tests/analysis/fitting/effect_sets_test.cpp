@@ -96,7 +96,7 @@ TEST(EffectSets, StepwiseSelectionGoesOnToThree) {
       EXPECT_TRUE(std::ranges::find(choice.effects, wave) != choice.effects.end()) << choice.criterion << wave;
 }
 
-// Whatever led the search to a set of five, what stays without each of its effects was tried, too.
+// The search also tries the sets of four that a set of five holds, whatever led it there.
 TEST(EffectSets, HoldWhatStaysWithoutEachEffectOfALargerOne) {
   constexpr std::size_t at_work = 5;
   const Waves model(line(0, 1, 2400), at_work);

@@ -23,7 +23,7 @@ namespace {
 
 constexpr std::size_t trials = 40;
 
-// What is said of the groups of trials whose b is off by so much, trial by trial; empty: nothing. The state forgets
+// Returns the note on trials whose b is off by so much, trial by trial; empty where there is none. The state forgets
 // its past fast, so that no law of the state can say of which machine a trial is.
 std::string said_of(unsigned seed, const std::function<double(std::size_t)>& off) {
   const auto next = [&](double x, double z, std::size_t t) { return 0.2 * x + 0.3 + off(t) + 0.2 * z; };

@@ -305,6 +305,8 @@ class Folder(unittest.TestCase):
                                 ("crew", "there is no column crew, which labels names")):
             with self.assertRaisesRegex(metastable.InputError, sentence):
                 metastable.runs(pendulum(), self.folder.name, labels=[label])
+        with self.assertRaisesRegex(metastable.InputError, "^labels: 'crew' is there twice$"):
+            metastable.runs(pendulum(), {"trial": [1], "swing_rad": [0.5], "crew": ["day"]}, labels=["crew", "crew"])
 
     def test_without_its_machine_the_way_is_named(self):
         self.put("experiment.toml", 'system = "machine"\n[machine]\nmodel = "none"\n')
