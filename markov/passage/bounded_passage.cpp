@@ -8,6 +8,8 @@
 #include <numeric>
 #include <stdexcept>
 
+#include "markov/passage/distribution_bound.h"
+
 namespace metastable::markov {
 namespace {
 
@@ -277,6 +279,7 @@ BoundedQuasiStationary bounded_quasi_stationary(const Chain& chain, const Heard&
   bounded.quasi = quasi_stationary_as_a_whole(chain, pair, heard);
   if (pair.rate == 1 || pair.rate == 0) {
     bounded.rate_lower = bounded.rate_upper = bounded.quasi.failure_rate;
+    bound_distribution(chain, pair.left, pair.right, Way::iterated, bounded, heard);
     return bounded;
   }
   SplitVector weight{Row(chain.size(), 0), pair.right};
@@ -296,6 +299,7 @@ BoundedQuasiStationary bounded_quasi_stationary(const Chain& chain, const Heard&
       std::max({bounded.rate_upper / bounded.rate_lower, bounded.rate_upper / rate, rate / bounded.rate_lower}) - 1;
   if (!(error <= widest_bound)) refuse("failure rate", error);
   rate = std::max(bounded.rate_lower, std::min(bounded.rate_upper, rate));
+  bound_distribution(chain, pair.left, pair.right, Way::iterated, bounded, heard);
   return bounded;
 }
 

@@ -2,7 +2,9 @@
 // Answers about chains that are too large to eliminate, with proven bounds.
 
 #include <cstdint>
+#include <limits>
 #include <span>
+#include <string>
 #include <vector>
 
 #include "markov/chain/chain.h"
@@ -48,6 +50,10 @@ struct BoundedQuasiStationary {
   QuasiStationary quasi;
   double rate_lower = 0,
          rate_upper = 1;  ///< of the failure rate: min and max of (w - Q w) / w, w > 0 (Collatz, Wielandt)
+  /// Proven bound of the total variation between the distribution and the true one: half of the sum of absolute
+  /// differences, below 1; infinite where there is none. bound_distribution() finds it.
+  double distribution_error = std::numeric_limits<double>::infinity();
+  std::string unproven;  ///< says why there is no bound of the distribution; empty where there is one
 };
 /// Bounds the failure rate by a vector: (w - Q w) / w on the states where w > 0. Bounds that are there already stay
 /// where they are narrower.

@@ -15,6 +15,7 @@
 #include "markov/chain/solver.h"
 #include "markov/passage/bounded_passage.h"
 #include "markov/passage/bounded_survival.h"
+#include "markov/passage/distribution_bound.h"
 #include "markov/passage/first_passage.h"
 #include "markov/passage/last_steps.h"
 #include "markov/passage/quasi_stationary.h"
@@ -50,14 +51,18 @@ class HeldChain {
   }
   const markov::BoundedQuasiStationary& quasi_stationary(const markov::Heard& heard) {
     const std::lock_guard lock(*making_);
-    if (!quasi_) quasi_ = iterates() ? bounded_quasi_stationary(chain_, heard) : eliminated_quasi_stationary();
+    if (!quasi_) quasi_ = iterates() ? bounded_quasi_stationary(chain_, heard) : eliminated_quasi_stationary(heard);
     return *quasi_;
   }
 
  private:
-  markov::BoundedQuasiStationary eliminated_quasi_stationary() {
-    markov::BoundedQuasiStationary found{markov::quasi_stationary(solver()), 0, 1};
-    markov::enclose_rate(chain_, markov::split(found.quasi.survival_weight), found);
+  markov::BoundedQuasiStationary eliminated_quasi_stationary(const markov::Heard& heard) {
+    markov::BoundedQuasiStationary found;
+    found.quasi = markov::quasi_stationary(solver());
+    const std::vector<markov::Extended> left(found.quasi.distribution.begin(), found.quasi.distribution.end());
+    const markov::SplitVector weight = markov::split(found.quasi.survival_weight);
+    markov::enclose_rate(chain_, weight, found);
+    markov::bound_distribution(chain_, left, weight.rest, way_, found, heard);
     return found;
   }
 
@@ -152,6 +157,9 @@ py::dict quasi_stationary(HeldChain& held, const py::object& progress) {
   told["failure_rate"] = found.quasi.failure_rate;
   told["lower"] = found.rate_lower;
   told["upper"] = found.rate_upper;
+  told["distribution_error"] =
+      std::isfinite(found.distribution_error) ? py::cast(found.distribution_error) : py::none();
+  told["unproven"] = found.unproven.empty() ? py::none() : py::cast(found.unproven);
   told["residual"] = found.quasi.residual;
   told["iterations"] = found.quasi.iterations;
   return told;

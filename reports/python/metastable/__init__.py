@@ -771,14 +771,19 @@ class FirstPassage(_ByState):
 class QuasiStationary(_ByState):
     """What survivors look like once the start is forgotten: their `distribution`, the `survival_weight` of each state
     (largest 1), and the `failure_rate` per step, proven to lie from `lower` to `upper`; where some states do not lead
-    to others, that is proven of the group of states found to fade slowest, not that no other group fades more slowly.
-    Distribution and weight are estimates, without a proven bound: `residual` is the largest of |y Q - lambda y| and
+    to others, that is proven of the group of states found to fade slowest, not that no other group fades more slowly,
+    unless there is a `distribution_error`: a proven bound of the total variation (half of the sum of absolute
+    differences) between the distribution and the true one of the chain as given. It is None where groups of states change
+    places too rarely to prove one below 1, or no state is visited twice; `unproven` says why then, and is None otherwise.
+    The weight is an estimate, without a proven bound: `residual` is the largest of |y Q - lambda y| and
     |Q x - lambda x|, entry by entry, relative to the entry times the probability of leaving its state, and of the error
     that may be left along other eigenvectors; `iterations` says how long it took."""
 
-    def __init__(self, distribution, survival_weight, failure_rate, lower, upper, residual, iterations):
+    def __init__(self, distribution, survival_weight, failure_rate, lower, upper, distribution_error, unproven, residual,
+                 iterations):
         super().__init__(dict(distribution=distribution, survival_weight=survival_weight, failure_rate=failure_rate,
-                              lower=lower, upper=upper, residual=residual, iterations=iterations))
+                              lower=lower, upper=upper, distribution_error=distribution_error, unproven=unproven,
+                              residual=residual, iterations=iterations))
 
     def __repr__(self):
         return f"<metastable.QuasiStationary: failure rate {self.failure_rate:.6g} per step>"

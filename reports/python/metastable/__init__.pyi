@@ -399,10 +399,13 @@ class QuasiStationary(Record):
     failure_rate: float
     lower: float
     upper: float
+    distribution_error: Optional[float]
+    unproven: Optional[str]
     residual: float
     iterations: int
     def __init__(self, distribution: Floats, survival_weight: Floats, failure_rate: float, lower: float, upper: float,
-                 residual: float, iterations: int) -> None: ...
+                 distribution_error: Optional[float], unproven: Optional[str], residual: float,
+                 iterations: int) -> None: ...
 
 
 class Passage(Record):

@@ -70,6 +70,7 @@ TEST_P(BoundedChains, AgreesWithEliminationWithinItsBounds) {
   const BoundedQuasiStationary bounded = bounded_quasi_stationary(chain);
   EXPECT_LE(bounded.rate_lower, bounded.quasi.failure_rate);
   EXPECT_GE(bounded.rate_upper, bounded.quasi.failure_rate);
+  EXPECT_LE(bounded.distribution_error, 1e-6) << bounded.unproven;
   // y (I - Q) = rate y, by one elimination.
   const std::vector<double> again = solver.solve_left(bounded.quasi.distribution);
   for (std::size_t i = 0; i < states; ++i)

@@ -10,6 +10,7 @@
 #include <random>
 
 #include "markov/chain/solver.h"
+#include "markov/passage/distribution_bound.h"
 #include "markov/passage/quasi_stationary.h"
 #include "tests/markov/exact_answers.h"
 #include "tests/message_of.h"
@@ -96,6 +97,21 @@ double worst(const std::vector<double>& found, const std::vector<Digits>& exact,
 
 std::vector<double> kill_rates(const Chain& chain) { return {chain.kill().begin(), chain.kill().end()}; }
 
+/// Expects bounds of distribution and rate to hold what 400 digits say, where they say anything.
+void expect_bounded(const Chain& chain, const QuasiStationary& quasi, const Exact& exact, int problem) {
+  BoundedQuasiStationary found;
+  found.quasi = quasi;
+  const SplitVector left = split(quasi.distribution), weight = split(quasi.survival_weight);
+  enclose_rate(chain, weight, found);
+  bound_distribution(chain, left.rest, weight.rest, Way::eliminated, found);
+  Digits apart = 0;
+  for (std::size_t i = 0; i < chain.size(); ++i) apart += abs(Digits(quasi.distribution[i]) - exact.left[i]) / 2;
+  const Digits traces("1e-100");
+  EXPECT_FALSE(apart > Digits(found.distribution_error)) << problem;
+  EXPECT_FALSE(Digits(found.rate_lower) > exact.rate * (1 + traces)) << problem;
+  EXPECT_FALSE(Digits(found.rate_upper) < exact.rate * (1 - traces)) << problem;
+}
+
 Chain random_kind(std::mt19937_64& engine, int kind) {
   const auto uniform = [&](double a, double b) { return std::uniform_real_distribution<double>(a, b)(engine); };
   const auto n = static_cast<std::size_t>(2 + engine() % 5);
@@ -134,6 +150,7 @@ TEST(LeadingPair, HasEveryEntryOverAWideFamilyOfChains) {
           std::max({worst(quasi.distribution, exact.left, beside), worst(quasi.survival_weight, exact.right, beside),
                     std::abs(quasi.failure_rate / exact.rate.convert_to<double>() - 1)});
       EXPECT_LT(off, (kind == 4 ? 1e-8 : 1e-12) + 4 * quasi.residual) << problem;
+      expect_bounded(chain, quasi, exact, problem);
       ++found;
     } catch (const NotUnique& error) {
       // Either two classes have one rate, or failure rates of another rounding give another distribution.

@@ -40,6 +40,8 @@ class Chains(unittest.TestCase):
         self.assertAlmostEqual(quasi.failure_rate, 1 - values.real.max(), 12)
         left = np.abs(vectors[:, values.real.argmax()].real)
         np.testing.assert_allclose(quasi.distribution, left / left.sum(), rtol=1e-9)
+        self.assertLess(quasi.distribution_error, 1e-13)
+        self.assertIsNone(quasi.unproven)
         np.testing.assert_allclose(chain.survival(3, [0, 1, 7]),
                                    [np.linalg.matrix_power(matrix, k)[3].sum() for k in (0, 1, 7)], rtol=1e-10)
         into = np.arange(n) < 3
@@ -104,6 +106,21 @@ class Chains(unittest.TestCase):
         self.assertAlmostEqual(quasi.distribution.sum(), 1, 14)
         after = quasi.distribution @ matrix
         np.testing.assert_allclose(after, (1 - quasi.failure_rate) * quasi.distribution, rtol=1e-14)
+
+    def test_the_distribution_has_a_bound_or_a_reason(self):
+        # Both groups of two states change places by c, each state fails with its group's rate: a chain of two states.
+        c, slow, fast = 1e-10, 1e-12, 3e-12
+        matrix = np.array([[0, .5, c, 0], [.5, 0, c, 0], [c, 0, 0, .5], [c, 0, .5, 0]])
+        quasi = metastable.chain(matrix, [slow, slow, fast, fast]).quasi_stationary()
+        half = (fast - slow) / 2
+        weight = half + np.hypot(half, c)  # of the slow group, where the fast one has c
+        share = weight / (weight + c)
+        error = abs(quasi.distribution[:2].sum() - share)
+        self.assertLessEqual(error, quasi.distribution_error + 1e-15)
+        self.assertTrue(1e-15 < quasi.distribution_error < 1e-6)
+        passing = metastable.chain([[0, .5], [0, 0]], [.5, 1]).quasi_stationary()
+        self.assertIsNone(passing.distribution_error)
+        self.assertRegex(passing.unproven, "no state is visited twice")
 
     def test_what_is_not_unique_is_said(self):
         with self.assertRaisesRegex(metastable.ComputationError, "not unique"):
