@@ -33,7 +33,7 @@ set(ROOMS
   "analysis/wheel_model: dynamics/numerics dynamics/catalogue dynamics/wheel dynamics/step_density dynamics/settled dynamics/extended_wheel analysis/statistics analysis/fitting analysis/experiment"
   "analysis/drum_model: dynamics/numerics dynamics/catalogue analysis/statistics analysis/fitting analysis/experiment"
   "analysis/machine_model: markov/mesh dynamics/numerics analysis/statistics analysis/fitting"
-  "analysis/walker_model: markov dynamics/numerics dynamics/catalogue dynamics/laboratory dynamics/walkers analysis/statistics analysis/walkers analysis/diagnosis analysis/experiment analysis/machine_model"
+  "analysis/walker_model: markov dynamics/numerics dynamics/catalogue dynamics/laboratory dynamics/walkers analysis/statistics analysis/walkers analysis/fitting analysis/diagnosis analysis/experiment analysis/machine_model"
   "analysis/experiment_model: analysis/fitting analysis/diagnosis analysis/experiment analysis/wheel_model analysis/drum_model"
   "analysis/blind: dynamics/numerics dynamics/catalogue analysis/statistics analysis/walkers analysis/fitting analysis/diagnosis analysis/experiment analysis/wheel_model analysis/machine_model analysis/walker_model"
   "analysis/motion_capture: markov dynamics/extended_wheel dynamics/return_map analysis/statistics analysis/experiment"

@@ -41,7 +41,8 @@ struct BlindAnswer {
   /// 90 % intervals of the machine's expected steps: as answered, and as the rests alone count them. The upper end may
   /// be infinite.
   std::optional<std::pair<double, double>> steps = {}, steps_counted = {};
-  /// Lists by criterion (AICc, BIC) the effects that stepwise selection over the same models names.
+  /// Lists by criterion (AICc, BIC) the effects that stepwise selection over the same models names, and for walks those
+  /// that least squares of one-step predictions does (Gauss-Newton AICc, Gauss-Newton BIC).
   std::map<std::string, std::vector<std::string>> stepwise = {};
 };
 

@@ -14,6 +14,7 @@
 #include "analysis/experiment/suggestion.h"
 #include "analysis/machine_model/machine_transitions.h"
 #include "analysis/statistics/random.h"
+#include "analysis/walker_model/step_least_squares.h"
 #include "analysis/walker_model/steps_reader.h"
 #include "analysis/walkers/walker_study.h"
 #include "dynamics/catalogue/walker_effects.h"
@@ -246,7 +247,10 @@ Diagnosis diagnose_walks(const Walks& walks, const DiagnosisOptions& options) {
   if (!options.elsewhere.empty()) throw std::invalid_argument("--at-slope, --at-speed: have no meaning with walks");
   std::shared_ptr<const TransitionModel> model = machine_transitions(walks.machine, walks.runs);
   require_effects(options.catalogue, model->effect_ids());
-  return diagnose(std::move(model), options);
+  Diagnosis answer = diagnose(std::move(model), options);
+  for (StepwiseChoice& choice : least_squares_selection(*walks.machine, walks.runs, options.catalogue))
+    answer.causes.stepwise.push_back(std::move(choice));
+  return answer;
 }
 
 ExperimentSource source_of(const WalkFiles& files, const std::string& name) {

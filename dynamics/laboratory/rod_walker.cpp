@@ -17,10 +17,12 @@ constexpr double cord = 0.25;           // [m] of the load
 constexpr double drive_lag = 0.3;       // [s]
 constexpr double ramp_frequency = 0.6;  // [Hz]
 constexpr double ground = 1e-6;         // [m], over which a foot is not on it
-constexpr int projections = 2;          // from errors of 1e-9 to those of rounding
+constexpr double least_compliance = 1e-7;  // [rad/(N m)] of a knee that is not rigid
+constexpr double knee_piece = 0.7;         // of 1/(natural frequency of a knee); halving it moves a step by 1e-9
+constexpr int projections = 2;             // from errors of 1e-9 to those of rounding
 
 using Eight = std::array<double, 8>;
-using Five = std::array<double, 5>;
+using Six = std::array<double, 6>;
 
 // Returns where `value` changes its sign in (0, longest), at whose ends it has different signs.
 template <class Value>
@@ -31,14 +33,46 @@ double crossing(const Value& value, double longest, double at_zero, double at_lo
   return 0.5 * (low + high);
 }
 
-// The rates of the constraints by the rates of the coordinates, row by row: the two legs, the standing foot's height
-// and its rolling, the cord.
+// The knee of a leg whose foot stands on the ground at x: its bend, thigh less shank, and the bend's slopes by the
+// positions of hip and knee.
+struct Knee {
+  double bend = 0, rate = 0;
+  std::array<double, 2> by_hip{}, by_knee{};
+
+  Knee(const double* s, std::size_t leg, double x) {
+    const std::size_t at = 2 + 2 * leg;
+    const double tx = s[at] - s[0], ty = s[at + 1] - s[1], sx = x - s[at], sy = -s[at + 1];
+    const double t = tx * tx + ty * ty, l = sx * sx + sy * sy;
+    bend = std::atan2(tx * -sy + ty * sx, tx * sx + ty * sy);
+    by_hip = {ty / t, -tx / t};
+    by_knee = {-ty / t - sy / l, tx / t + sx / l};
+    rate = by_hip[0] * s[8] + by_hip[1] * s[9] + by_knee[0] * s[8 + at] + by_knee[1] * s[9 + at];
+  }
+};
+
+// Returns m (ab/(a + b))^2: the inertia of the knee's bend where hip and foot are held.
+double inertia_of_bend(const RodLeg& leg) {
+  const double arm = leg.foot_to_mass * leg.mass_to_hip / leg.length();
+  return leg.mass * arm * arm;
+}
+
+// The rates of the constraints by the rates of the coordinates, row by row: the two legs; the standing foot's height
+// and its rolling, or the shank of a knee that gives; the cord.
 struct Constraints {
   std::size_t rows = 4, coordinates = 6;
-  std::array<Eight, 5> by{};
-  Five turning{};  // what the acceleration of a constraint has without accelerations
-  Five off{};      // by how much the positions violate it
+  std::array<Eight, 6> by{};
+  Six turning{};  // what the acceleration of a constraint has without accelerations
+  Six off{};      // by how much the positions violate it
   Eight inverse_mass{};
+
+  // Holds the knee at a distance from the foot that stands at x.
+  void shank(std::size_t row, const double* s, std::size_t knee, double x, double length) {
+    const double d[] = {s[2 * knee] - x, s[2 * knee + 1]}, *v = s + 8 + 2 * knee;
+    by[row][2 * knee] = d[0];
+    by[row][2 * knee + 1] = d[1];
+    turning[row] = v[0] * v[0] + v[1] * v[1];
+    off[row] = 0.5 * (d[0] * d[0] + d[1] * d[1] - length * length);
+  }
 
   void rod(std::size_t row, const double* s, std::size_t from, std::size_t to, double length) {
     double squared = 0;
@@ -53,9 +87,9 @@ struct Constraints {
   }
 
   // Changes `rates` by impulses along the constraints, so that these change at the rates wanted.
-  void hold(Eight& rates, const Five& wanted) const {
-    std::array<Five, 5> a{};
-    Five b{};
+  void hold(Eight& rates, const Six& wanted) const {
+    std::array<Six, 6> a{};
+    Six b{};
     for (std::size_t i = 0; i < rows; ++i) {
       b[i] = wanted[i];
       for (std::size_t k = 0; k < coordinates; ++k) b[i] -= by[i][k] * rates[k];
@@ -84,13 +118,18 @@ struct Constraints {
 // @param s  positions and velocities; @param anchor  of the standing foot's rolling
 Constraints constraints_at(const RodWalkerOptions& o, int stance, double anchor, double angle, const double* s) {
   Constraints c;
-  const bool loaded = o.load_mass > 0;
-  c.rows = loaded ? 5 : 4;
+  const bool loaded = o.load_mass > 0, gives = o.knee_compliance >= least_compliance;
+  c.rows = (loaded ? 5 : 4) - (gives ? 1 : 0);
   c.coordinates = loaded ? 8 : 6;
   const double masses[] = {o.hip_mass, o.legs[0].mass, o.legs[1].mass, o.load_mass};
   for (std::size_t k = 0; k < c.coordinates; ++k) c.inverse_mass[k] = 1 / masses[k / 2];
   for (std::size_t leg = 0; leg < 2; ++leg) c.rod(leg, s, 0, 1 + leg, o.legs[leg].mass_to_hip);
   const auto leg = static_cast<std::size_t>(stance), at = 1 + leg;
+  if (loaded) c.rod(c.rows - 1, s, 0, 3, cord);
+  if (gives) {
+    c.shank(2, s, at, anchor, o.legs[leg].foot_to_mass);
+    return c;
+  }
   const double b = o.legs[leg].mass_to_hip, share = (o.legs[leg].length() - o.foot_radius) / b;
   const double dx = s[2 * at] - s[0], dy = s[2 * at + 1] - s[1];
   c.by[2][1] = c.by[3][0] = 1 - share;
@@ -102,7 +141,6 @@ Constraints constraints_at(const RodWalkerOptions& o, int stance, double anchor,
   c.by[3][2 * at + 1] += roll * dx;
   c.by[3][0] += roll * dy;
   c.by[3][1] -= roll * dx;
-  if (loaded) c.rod(4, s, 0, 3, cord);
   return c;
 }
 
@@ -118,8 +156,25 @@ double RodWalker::mass(std::size_t point) const {
   return point == 0 ? options_.hip_mass : point == 3 ? options_.load_mass : options_.legs[point - 1].mass;
 }
 
+bool RodWalker::gives() const { return options_.knee_compliance >= least_compliance; }
+
+// Returns the length of a Runge-Kutta step [s]. @param length  of the leg that sets the unit of time
+double RodWalker::longest_piece(double length) const {
+  const double usual = piece * std::sqrt(length / options_.gravity);
+  if (!gives()) return usual;
+  const double inertia = inertia_of_bend(options_.legs[static_cast<std::size_t>(stance_)]);
+  return std::min(usual, knee_piece * std::sqrt(inertia * options_.knee_compliance));
+}
+
+std::array<double, 2> RodWalker::knee() const {
+  if (!gives()) return {0, 0};
+  const Knee found(state_.data(), static_cast<std::size_t>(stance_), anchor_);
+  return {found.bend, found.rate};
+}
+
 // Returns the foot of a leg, or the centre of its arc, along and above the slope.
 std::array<double, 2> RodWalker::foot(int leg) const {
+  if (gives() && leg == stance_) return {anchor_, 0};
   const auto i = static_cast<std::size_t>(leg);
   const double share = (options_.legs[i].length() - options_.foot_radius) / options_.legs[i].mass_to_hip;
   return {state_[0] + share * (state_[2 + 2 * i] - state_[0]), state_[1] + share * (state_[3 + 2 * i] - state_[1])};
@@ -153,6 +208,7 @@ double RodWalker::lead(const State& s) const {
     const double share = (options_.legs[i].length() - options_.foot_radius) / options_.legs[i].mass_to_hip;
     x[i] = s[0] + share * (s[2 + 2 * i] - s[0]);
   }
+  if (gives()) x[stance_] = anchor_;
   return x[1 - stance_] - x[stance_];
 }
 
@@ -168,6 +224,13 @@ Eight RodWalker::forces(const State& s, double time) const {
   for (std::size_t i = 0; i < count(); ++i) {
     f[2 * i] = mass(i) * along;
     f[2 * i + 1] = -mass(i) * down;
+  }
+  if (gives()) {
+    const auto leg = static_cast<std::size_t>(stance_), at = 2 + 2 * leg;
+    const Knee knee(s.data(), leg, anchor_);
+    const double stiffness = 1 / o.knee_compliance;
+    const double moment = stiffness * knee.bend + 2 * std::sqrt(stiffness * inertia_of_bend(o.legs[leg])) * knee.rate;
+    for (std::size_t k = 0; k < 2; ++k) f[k] -= moment * knee.by_hip[k], f[at + k] -= moment * knee.by_knee[k];
   }
   double on_stance = stance_ == 0 ? -s[16] : s[16];
   if (o.hip_damping != 0) on_stance -= o.hip_damping * turning(s);
@@ -189,7 +252,7 @@ Eight RodWalker::forces(const State& s, double time) const {
 void RodWalker::derivative(const State& s, State& ds, double time) const {
   Constraints c = constraints_at(options_, stance_, anchor_, 0, s.data());
   Eight a = forces(s, time);
-  Five wanted{};
+  Six wanted{};
   for (std::size_t k = 0; k < c.coordinates; ++k) a[k] *= c.inverse_mass[k];
   for (std::size_t i = 0; i < c.rows; ++i) wanted[i] = -c.turning[i];
   c.hold(a, wanted);
@@ -270,7 +333,7 @@ void RodWalker::project() {
   for (int i = 0; i < projections; ++i) {
     const Constraints c = constraints_at(options_, stance_, anchor_, angle(state_, stance_), state_.data());
     Eight change{};
-    Five wanted{};
+    Six wanted{};
     for (std::size_t row = 0; row < c.rows; ++row) wanted[row] = -c.off[row];
     c.hold(change, wanted);
     for (std::size_t k = 0; k < c.coordinates; ++k) state_[k] += change[k];
@@ -319,10 +382,10 @@ bool RodWalker::reach_strike(double slope) {
   slope_ = slope;
   just_turned_ = false;
   const double length = options_.legs[static_cast<std::size_t>(stance_)].length();
-  const double unit = std::sqrt(length / options_.gravity), begun = time_;
+  const double unit = std::sqrt(length / options_.gravity), begun = time_, longest = longest_piece(length);
   while (time_ - begun <= longest_share * unit) {
     State end;
-    const double passed = next_piece(piece * unit, end);
+    const double passed = next_piece(longest, end);
     if (const auto time = landing(passed, end)) {
       const State struck = moved(*time);
       turns_ = false;
@@ -331,18 +394,20 @@ bool RodWalker::reach_strike(double slope) {
     }
     arrive(end, passed);
     if (!(std::abs(angle(state_, stance_)) < std::numbers::pi / 2)) return false;
+    if (!(std::abs(knee()[0]) < std::numbers::pi / 2)) return false;
   }
   return false;
 }
 
 void RodWalker::strike() {
+  const double struck = foot(1 - stance_)[0], kept = std::sqrt(1 - options_.impact_loss);
   stance_ = 1 - stance_;
-  const double kept = std::sqrt(1 - options_.impact_loss);
-  anchor_ = foot(stance_)[0] + options_.foot_radius * angle(state_, stance_);
+  anchor_ = struck + options_.foot_radius * angle(state_, stance_);
   project();
   for (std::size_t k = 8; k < 16; ++k) state_[k] *= kept;
   if (options_.foot_slip == 0) return;
-  // Both feet stay on the ground, further apart; the legs turn as they did.
+  // Both feet stay on the ground, further apart; the legs turn as they did, the new standing one as a whole.
+  state_ = locked();
   const double on = foot(stance_)[0] + options_.foot_slip, apart = on - foot(1 - stance_)[0];
   const double l = options_.legs[static_cast<std::size_t>(stance_)].length() - options_.foot_radius;
   const double other = options_.legs[static_cast<std::size_t>(1 - stance_)].length() - options_.foot_radius;
@@ -364,7 +429,7 @@ bool RodWalker::step(double slope) {
 void RodWalker::move(double slope, double time) {
   slope_ = slope;
   just_turned_ = false;
-  const double unit = piece * std::sqrt(options_.legs[0].length() / options_.gravity);
+  const double unit = longest_piece(options_.legs[0].length());
   for (const double until = time_ + time; time_ < until;) {
     State end;
     const double passed = next_piece(std::min(unit, until - time_), end);
@@ -372,9 +437,26 @@ void RodWalker::move(double slope, double time) {
   }
 }
 
+// Returns the state after the impulse that locks a standing knee that gives.
+RodWalker::State RodWalker::locked() const {
+  if (!gives()) return state_;
+  Constraints c = constraints_at(options_, stance_, anchor_, 0, state_.data());
+  const auto leg = static_cast<std::size_t>(stance_), at = 2 + 2 * leg;
+  const Knee knee(state_.data(), leg, anchor_);
+  for (std::size_t k = 0; k < 2; ++k) c.by[c.rows][k] = knee.by_hip[k], c.by[c.rows][at + k] = knee.by_knee[k];
+  ++c.rows;
+  Eight v;
+  std::copy_n(state_.begin() + 8, 8, v.begin());
+  c.hold(v, {});
+  State s = state_;
+  std::copy_n(v.begin(), 8, s.begin() + 8);
+  return s;
+}
+
 RodStride RodWalker::stride() const {
-  return {0.5 * (angle(state_, stance_) - angle(state_, 1 - stance_)), rate(state_, stance_),
-          rate(state_, 1 - stance_)};
+  const State s = locked();
+  const double stands = gives() ? std::atan2(anchor_ - s[0], s[1]) : angle(s, stance_);
+  return {0.5 * (stands - angle(s, 1 - stance_)), rate(s, stance_), rate(s, 1 - stance_)};
 }
 
 std::vector<RodPoint> RodWalker::points() const {
@@ -387,6 +469,7 @@ std::vector<RodPoint> RodWalker::points() const {
 double RodWalker::energy(double slope) const {
   const double apart = angle(state_, stance_) - angle(state_, 1 - stance_);
   double sum = 0.5 * options_.hip_spring * apart * apart;
+  if (gives()) sum += 0.5 * knee()[0] * knee()[0] / options_.knee_compliance;
   for (const RodPoint& p : points())
     sum += p.mass *
            (0.5 * (p.vx * p.vx + p.vy * p.vy) + options_.gravity * (p.y * std::cos(slope) - p.x * std::sin(slope)));

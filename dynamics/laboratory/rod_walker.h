@@ -38,6 +38,11 @@ struct RodWalkerOptions {
   double load_mass = 0;       ///< [kg], hung from the hip on a cord of 0.25 m
   double sway = 0;            ///< [m], amplitude of the ramp along itself, at 0.6 Hz
   double sway_phase_rad = 0;  ///< [rad] of it at time 0
+  /// Compliance of the standing leg's knee [rad/(N m)]; below 1e-7 the knee is rigid. It takes foot_radius = 0 and legs
+  /// with foot_to_mass > 0. The knee sits at the leg's mass, a spring of stiffness k = 1/compliance and a damper
+  /// 2 sqrt(k m) a b/(a + b) hold it straight (critical where hip and foot are held; m, a, b of the leg), and it bends
+  /// either way. The shank below it has no mass: the moment that its foot leaves the ground it is straight again.
+  double knee_compliance = 0;
 };
 
 /// One of the point masses. Axes: x along the slope, downhill; y normal to it, up.
@@ -61,7 +66,8 @@ class RodWalker {
 
   /// Walks to just after the next strike on a plane of this slope [rad]; the plane tilts under the walker as it begins.
   /// Returns false if it falls: the stance leg lies down, no strike comes within 30 sqrt(length/gravity), or the legs
-  /// are then not apart by an angle below pi. About 0.2 ms.
+  /// are then not apart by an angle below pi, or the standing knee bends by more than pi/2. About 0.2 ms, and with a
+  /// knee 0.4 ms sqrt(1e-3 rad/(N m) / compliance) where that is more.
   bool step(double slope);
   /// Walks to just before the strike; false if it falls.
   bool reach_strike(double slope);
@@ -71,12 +77,16 @@ class RodWalker {
   void move(double slope, double time);
 
   int stance_leg() const { return stance_; }
+  /// Returns angles from hip to foot, and the rates that legs have if the standing knee locks now, by what impulse that
+  /// takes: a knee that gives bears no impulsive moment, and as it stiffens what it does after a strike becomes this.
   RodStride stride() const;
   double time() const { return time_; }                       ///< since it was put down [s]
   double position() const { return foot(stance_)[0]; }        ///< of the standing foot, downhill [m]
   double swing_foot() const { return foot(1 - stance_)[0]; }  ///< of the other one
   std::vector<RodPoint> points() const;                       ///< hip, leg 0, leg 1 and, if there is one, the load
-  double energy(double slope) const;                          ///< of motion, height and spring [J]; the ramp at rest
+  double energy(double slope) const;                          ///< of motion, height and springs [J]; the ramp at rest
+  /// Returns the bend of the standing leg's knee [rad], thigh less shank, and its rate [rad/s]; 0 where it is rigid.
+  std::array<double, 2> knee() const;
 
  private:
   // Positions x, y of hip, leg 0, leg 1, load; their velocities; the motor's torque on leg 1.
@@ -90,9 +100,12 @@ class RodWalker {
   double height(const State& s) const;
   double height_of(const State& s, std::size_t at) const;
   double lead(const State& s) const;
+  bool gives() const;
+  double longest_piece(double length) const;
   std::array<double, 8> forces(const State& s, double time) const;
   void derivative(const State& s, State& ds, double time) const;
   State moved(double time) const;
+  State locked() const;
   double next_piece(double longest, State& end);
   std::optional<double> landing(double passed, const State& end) const;
   void arrive(const State& end, double passed);

@@ -36,6 +36,7 @@ double& size_of(RodWalkerOptions& walker, std::string_view id) {
   if (id == "slow_motor") return walker.drive_torque;
   if (id == "swinging_load") return walker.load_mass;
   if (id == "swaying_ramp") return walker.sway;
+  if (id == "loose_knee") return walker.knee_compliance;
   throw std::logic_error(fmt::format("walker_laboratory: nothing says where {} acts", id));
 }
 
@@ -50,6 +51,7 @@ const std::vector<OutsideInfo>& walker_outside_effects() {
       {"slow_motor", "a motor swings the leg forward, with a lag", 1.5},
       {"swinging_load", "a load hangs from the hip on a cord", 2},
       {"swaying_ramp", "the ramp sways along itself, from a phase that each trial draws", 0.02},
+      {"loose_knee", "the standing leg's knee gives", 0.01},
   };
   return all;
 }
@@ -119,6 +121,8 @@ WalkerLaboratory::WalkerLaboratory(WalkerLaboratorySetup setup) : setup_(std::mo
     if (!seen.insert(effect.id).second) throw std::invalid_argument(fmt::format("effect {}: given twice", effect.id));
     size_of(walker_, effect.id) = effect.size;
   }
+  if (walker_.foot_radius > 0 && walker_.knee_compliance > 0)
+    throw std::invalid_argument("effect loose_knee: it is not known with round_feet");
 }
 
 // Returns the slope that the step from a row meets [rad]. @param own  the trial's part [deg]

@@ -21,6 +21,8 @@ namespace metastable::dynamics {
 /// slow_motor     a motor asks for `size` [N m] on the swinging leg, forward, and reaches it with a lag of 0.3 s
 /// swinging_load  a load of `size` [kg] hangs from the hip on a cord of 0.25 m
 /// swaying_ramp   the ramp sways along itself by `size` [m] at 0.6 Hz, from a phase that each trial draws
+/// loose_knee     the knee of the leg that stands gives by `size` [rad/(N m)], with a damper that is critical (see
+///                RodWalkerOptions::knee_compliance); not with round_feet
 const std::vector<OutsideInfo>& walker_outside_effects();
 /// @throws std::invalid_argument naming the id and all known ones
 const OutsideInfo& walker_outside_info(std::string_view id);

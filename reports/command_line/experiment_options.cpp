@@ -52,7 +52,7 @@ void add_laboratory_options(Options& o) {
         "With --reality, repeatable: an effect outside the catalogue (sloshing_fluid, planks, frame_resonance, "
         "stored_energy, speed_spread, double_plate, warming_feet, two_crews, loose_feet, second_memory, crosswind, "
         "wet_day, daily_cycle, hysteresis, wearing_leg, rough_stretch, sticky_start, swaying_floor; with --walker "
-        "round_feet, hip_spring, slow_motor, swinging_load, swaying_ramp)");
+        "round_feet, hip_spring, slow_motor, swinging_load, swaying_ramp, loose_knee)");
   o.add("skewness", "G", "0", "With --reality: skewness of restitution, (-2, 2)");
   o.add("sensor-noise", "SD", "0", "With --reality: white noise of every reported speed [rad/s]",
         dynamics::range::speed);

@@ -48,9 +48,10 @@ Table measures(const analysis::BlindGrades& grades, const std::string& law, cons
 // Shows stepwise selection beside the diagnosis.
 Table ways(const analysis::BlindGrades& grades, const Provenance& provenance) {
   Table table{.id = "blind-stepwise",
-              .title = "The diagnosis beside stepwise selection over the same models",
-              .notes = {"Forward selection from the recalibrated model, each chosen entry of a list "
-                        "(a leg, an interval) counted as a parameter; cases that were answered."},
+              .title = "The diagnosis beside stepwise selection",
+              .notes = {"AICc and BIC select forward over the diagnosis' own fits, from the recalibrated model, each "
+                        "chosen entry of a list (a leg, an interval) counted as a parameter. Of walkers Gauss-Newton "
+                        "AICc and BIC do so over least squares of one-step predictions. Cases that were answered."},
               .columns = {{"way"}, {"what it names"}, {"cases"}, {"of"}, {"share"}},
               .provenance = provenance};
   for (const analysis::WayGrade& way : grades.ways)

@@ -156,6 +156,18 @@ TEST(BlindGrade, StepwiseSelectionIsSetBesideTheDiagnosis) {
   EXPECT_EQ(counts(bic), (std::vector<int>{0, 1, 1, 0, 0, 0, 1}));
 }
 
+TEST(BlindGrade, ACriterionThatAnAnswerDoesNotTellOfNamesNothingThere) {
+  BlindAnswer tells = said(Verdict::explained, {"bounce"});
+  tells.stepwise = {{"Gauss-Newton BIC", {"bounce"}}};
+  const BlindTruth one = truth(BlindKind::effect, {"bounce"}, 2);
+  const BlindGrades g = grade({one, one}, {tells, said(Verdict::explained, {"bounce"})});
+  ASSERT_EQ(g.ways.size(), 2U);
+  EXPECT_EQ(g.ways[0].in.right, 2);
+  EXPECT_EQ(g.ways[1].way, "Gauss-Newton BIC");
+  EXPECT_EQ(g.ways[1].in.right, 1);
+  EXPECT_EQ(g.ways[1].in.of, 2);
+}
+
 TEST(BlindGrade, ThreeEffectsAreCountedAsThree) {
   const BlindTruth three = truth(BlindKind::many, {"bounce", "inertia", "trial_drift"}, 2);
   const BlindGrades g = grade({three, three}, {said(Verdict::explained, {"inertia+bounce+trial_drift"}),

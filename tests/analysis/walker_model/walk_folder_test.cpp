@@ -232,6 +232,9 @@ TEST_F(WalkFolder, LaunchesThatAreNotThoseStatedAreNamed) {
     const EstimatedParameter& offset = d.causes.at_work[0].parameters[0];
     EXPECT_NEAR(offset.value, 0.05, 0.01);
     EXPECT_LT(offset.upper - offset.lower, 0.02);
+    std::set<std::string> criteria;
+    for (const StepwiseChoice& choice : d.causes.stepwise) criteria.insert(choice.criterion);
+    EXPECT_EQ(criteria, (std::set<std::string>{"AICc", "BIC", "Gauss-Newton AICc", "Gauss-Newton BIC"}));
   }
 }
 

@@ -214,5 +214,104 @@ TEST(RodWalker, OutsideEffectsChangeAStepAndVanishWithTheirSize) {
   }
 }
 
+std::array<double, 3> after_steps(const RodWalkerOptions& options, int steps) {
+  RodWalker walker(options, 0, gait);
+  for (int i = 0; i < steps; ++i) EXPECT_TRUE(walker.step(slope + (i % 2 == 0 ? 0.004 : -0.003)));
+  const RodStride s = walker.stride();
+  return {s.half_angle, s.stance_rate, s.swing_rate};
+}
+
+// Holds rows against those of the rigid knee: with a tenth of the compliance a tenth of the difference stays.
+void expect_knee_stiffens_to(const RodWalkerOptions& rigid, int steps) {
+  const std::array<double, 3> ideal = after_steps(rigid, steps);
+  RodWalkerOptions loose = rigid, stiff = rigid;
+  loose.knee_compliance = 1e-4;
+  stiff.knee_compliance = 1e-5;
+  const std::array<double, 3> more = after_steps(loose, steps), less = after_steps(stiff, steps);
+  for (std::size_t i = 0; i < 3; ++i) {
+    EXPECT_LT(std::abs(more[i] - ideal[i]), 2e-3) << i;
+    EXPECT_NEAR(less[i] - ideal[i], 0.1 * (more[i] - ideal[i]), 0.02 * std::abs(more[i] - ideal[i]) + 1e-7) << i;
+  }
+  EXPECT_GT(std::abs(more[2] - ideal[2]), 1e-4);
+}
+
+TEST(RodWalker, AKneeThatStiffensBecomesTheRigidLeg) {
+  expect_knee_stiffens_to({}, 1);
+  expect_knee_stiffens_to({}, 5);
+}
+
+TEST(RodWalker, AKneeThatStiffensBecomesTheRigidLegBesideAllOtherEffects) {
+  RodWalkerOptions real;
+  real.legs[0] = {5.2, 0.5, 0.498};
+  real.hip_damping = 0.05;
+  real.hip_friction = 0.05;
+  real.impact_loss = 0.01;
+  real.foot_slip = 0.005;
+  real.hip_spring = 0.5;
+  real.load_mass = 0.5;
+  expect_knee_stiffens_to(real, 2);
+}
+
+TEST(RodWalker, AKneeBelowTheLeastComplianceIsRigid) {
+  RodWalkerOptions real;
+  real.knee_compliance = 0.9e-7;
+  EXPECT_EQ(after_steps(real, 2), after_steps({}, 2));
+}
+
+TEST(RodWalker, IsPutDownOnAKneeWithTheRatesOfALockedOne) {
+  RodWalkerOptions real;
+  real.knee_compliance = 1e-3;
+  const RodWalker walker(real, 1, gait);
+  EXPECT_NEAR(walker.stride().half_angle, gait.half_angle, 1e-14);
+  EXPECT_NEAR(walker.stride().stance_rate, gait.stance_rate, 1e-12);
+  EXPECT_NEAR(walker.stride().swing_rate, gait.swing_rate, 1e-12);
+}
+
+TEST(RodWalker, AKneeTakesEnergyByItsDamperAlone) {
+  RodWalkerOptions real;
+  real.knee_compliance = 2e-3;
+  RodWalker walker(real, 0, gait);
+  ASSERT_TRUE(walker.step(slope));  // the knee bends fast after a strike
+  const double damping = 2 * std::sqrt(5 / real.knee_compliance) * 0.25, time = 1e-4;
+  const double before = walker.energy(slope);
+  double last = before, taken = 0;
+  for (int i = 0; i < 4000; ++i) {
+    const double first = walker.knee()[1];
+    walker.move(slope, time);
+    const double end = walker.knee()[1];
+    taken += 0.5 * time * damping * (first * first + end * end);
+    EXPECT_LT(walker.energy(slope), last + 1e-10);
+    last = walker.energy(slope);
+  }
+  EXPECT_GT(taken, 0.01);
+  EXPECT_NEAR(before - last, taken, 1e-3 * taken);
+}
+
+TEST(RodWalker, AStrikeBearsNoMomentAtAKneeThatGives) {
+  // What hangs from the knee keeps its momentum about it, and all keep theirs about the struck foot.
+  RodWalkerOptions real;
+  real.knee_compliance = 1e-3;
+  RodWalker walker(real, 0, gait);
+  ASSERT_TRUE(walker.reach_strike(slope));
+  const double foot = walker.swing_foot();
+  const std::vector<RodPoint> before = walker.points();
+  walker.strike();
+  const std::vector<RodPoint> after = walker.points();
+  const auto above = [](const std::vector<RodPoint>& p) { return momentum({p[0], p[1]}, p[2].x, p[2].y); };
+  EXPECT_NEAR(above(after), above(before), 1e-12 * std::abs(above(before)));
+  EXPECT_NEAR(momentum(after, foot, 0), momentum(before, foot, 0), 1e-12 * std::abs(momentum(before, foot, 0)));
+  EXPECT_NEAR(walker.knee()[0], 0, 1e-12);
+  EXPECT_GT(std::abs(walker.knee()[1]), 0.1);
+}
+
+TEST(RodWalker, AKneeFarTooSoftFoldsAndTheWalkerFalls) {
+  RodWalkerOptions real;
+  real.knee_compliance = 0.1;  // the 196 N above it buckle a knee in the middle of 1 m from 0.02 rad/(N m) on
+  RodWalker walker(real, 0, gait);
+  int steps = 0;
+  while (steps < 20 && walker.step(slope)) ++steps;
+  EXPECT_LT(steps, 20);
+}
+
 }  // namespace
 }  // namespace metastable::dynamics::test

@@ -155,9 +155,29 @@ TEST(WalkerLaboratory, OutsideEffectsAreInNoCatalogueAndMoveTheWalk) {
     setup.outside = {{info.id, 0.2 * info.upper}};
     const std::vector<WalkedTrial> moved = walked(setup);
     ASSERT_GT(moved[0].rows.size(), 3u) << info.id;
-    EXPECT_GT(std::abs(moved[0].rows[3].truth.stance_rate - plain[0].rows[3].truth.stance_rate), 1e-3) << info.id;
+    const RodStride &with = moved[0].rows[3].truth, &without = plain[0].rows[3].truth;
+    EXPECT_GT(std::hypot(with.stance_rate - without.stance_rate, with.swing_rate - without.swing_rate), 1e-3)
+        << info.id;
   }
   EXPECT_GE(ids.size(), 4u);
+}
+
+TEST(WalkerLaboratory, WalksOnLooseKneesOfAnySize) {
+  for (const double share : {0.01, 0.1, 1.0}) {
+    WalkerLaboratorySetup setup = small(30);
+    setup.slope_sd_deg = 0.4;
+    setup.outside = {{"loose_knee", share * walker_outside_info("loose_knee").upper}};
+    std::size_t steps = 0, fell = 0;
+    for (const WalkedTrial& trial : walked(setup)) steps += trial.rows.size() - 1, fell += trial.fell;
+    EXPECT_GT(steps, 200u) << share;
+    EXPECT_LT(fell, 15u) << share;
+  }
+}
+
+TEST(WalkerLaboratory, LooseKneesAreNotKnownWithRoundFeet) {
+  WalkerLaboratorySetup setup = small();
+  setup.outside = {{"loose_knee", 0.001}, {"round_feet", 0.1}};
+  EXPECT_EQ(message_of([&] { WalkerLaboratory{setup}; }), "effect loose_knee: it is not known with round_feet");
 }
 
 TEST(WalkerLaboratory, EveryEffectOfTheCatalogueActs) {
