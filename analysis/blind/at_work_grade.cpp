@@ -99,6 +99,26 @@ std::vector<Grade> steps_grades(const std::vector<BlindTruth>& truths, const std
           {"  as narrow as twice the trials would count them, nothing outside the catalogue", narrow, 0.5, 1}};
 }
 
+std::vector<Grade> share_grades(const std::vector<BlindTruth>& truths, const std::vector<Answer>& answers) {
+  Proportion alone, beside;
+  const auto count = [](Proportion& tally, const auto& interval, double share) {
+    if (interval) tally.count(interval->first <= share && share <= interval->second);
+  };
+  for (std::size_t i = 0; i < truths.size(); ++i) {
+    const BlindTruth& truth = truths[i];
+    if (!answers[i] || !truth.gap_as_given) continue;
+    for (const BlindAnswer::SaidAtWork& said : answers[i]->at_work)
+      for (std::size_t e = 0; e < truth.effects.size(); ++e) {
+        if (said.probability < Rules{}.least_at_work || said.effects != std::vector{truth.effects[e].id}) continue;
+        const double left = truth.effects.size() == 1 ? truth.left : truth.left_by_effect[e];
+        count(alone, said.alone, truth.gap_as_given->alone[e] / truth.gap_as_given->all);
+        count(beside, said.beside, left / truth.gap_as_given->all);
+      }
+  }
+  return {{"shares of the gap that effects close alone: 90 % intervals hold", alone, 0.87, 0.93},
+          {"  beside the others", beside, 0.87, 0.93}};
+}
+
 std::vector<Grade> at_work_grades(const std::vector<BlindTruth>& truths, const std::vector<Answer>& answers) {
   AtWorkTally tally;
   for (std::size_t i = 0; i < truths.size(); ++i) {

@@ -14,6 +14,11 @@ namespace metastable::analysis {
 std::vector<Grade> at_work_grades(const std::vector<BlindTruth>& truths,
                                   const std::vector<std::optional<BlindAnswer>>& answers);
 
+/// Says how often the intervals of the shares that the effects at work close, alone and beside the others, hold what
+/// they truly close: of cases without anything from outside, by truth.gap_as_given.
+std::vector<Grade> share_grades(const std::vector<BlindTruth>& truths,
+                                const std::vector<std::optional<BlindAnswer>>& answers);
+
 /// Says how often the interval of the machine's expected steps holds what the laboratory counts, and how often it is as
 /// narrow as that of counting twice the trials. Cases without an interval, or with too few rests counted, are left out.
 std::vector<Grade> steps_grades(const std::vector<BlindTruth>& truths,

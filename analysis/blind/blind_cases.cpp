@@ -341,12 +341,19 @@ void complete_truth(BlindCase& made) {
 
 void complete_each(BlindTruth& truth, const Experiment& experiment) {
   const dynamics::NominalValues contact = stated_values(truth.restitution, truth.friction, experiment.wheel.leg_length);
-  complete_each(truth, [&](const auto& others) { return power_left(experiment, contact, truth.effects, others); });
+  complete_each(
+      truth, [&](const auto& others) { return power_left(experiment, contact, truth.effects, others); },
+      [&] { return gap_as_given(experiment, contact, truth.effects); });
 }
 
 void complete_each(BlindTruth& truth,
-                   const std::function<double(const std::vector<dynamics::Effect>& others)>& left_beside) {
+                   const std::function<double(const std::vector<dynamics::Effect>& others)>& left_beside,
+                   const std::function<GapAsGiven()>& gap) {
   truth.left_by_effect.clear();
+  const auto recalibrated = [](const dynamics::Effect& effect) { return is_recalibration(effect.id); };
+  truth.gap_as_given.reset();
+  if (!truth.outside && !truth.effects.empty() && std::ranges::none_of(truth.effects, recalibrated))
+    truth.gap_as_given = gap();
   if (truth.kind == BlindKind::mixed && truth.effects.size() == 1) truth.left_by_effect = {truth.left};
   if (truth.effects.size() < 2) return;
   for (std::size_t one = 0; one < truth.effects.size(); ++one) {

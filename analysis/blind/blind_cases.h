@@ -61,6 +61,8 @@ struct BlindTruth {
   /// The power left of each of several effects, after a recalibration that has the others in the model. It follows from
   /// the rest and the case and is not sealed; empty until complete_each().
   std::vector<double> left_by_effect = {};
+  /// It follows, too; nothing until complete_each(), and where something acts from outside or is recalibrated.
+  std::optional<GapAsGiven> gap_as_given = {};
   /// Collisions at risk and rests of the same experiment, run again and again in the laboratory: their ratio is the
   /// machine's expected steps. 0 where it was not run.
   double collisions_counted = 0, rests_counted = 0;
@@ -108,13 +110,15 @@ BlindCase blind_case(const BlindPlan& plan, int number, std::uint64_t seed, cons
 /// Sets truth.left from the case's own files; a case without an effect that can be weighed keeps 0. A fit takes about a
 /// second.
 void complete_truth(BlindCase& made);
-/// Sets truth.left_by_effect of a case of several effects, by a fit each; other kinds stay as they are.
+/// Sets truth.left_by_effect of a case of several effects, and truth.gap_as_given of one or several, by a fit each;
+/// other kinds stay as they are.
 /// @param experiment, walks  the case as it was written
 void complete_each(BlindTruth& truth, const Experiment& experiment);
 void complete_each(BlindTruth& truth, const Walks& walks);
 /// Does so by what the effect is worth beside the others.
-/// @param left_beside  takes the others
+/// @param left_beside  takes the others  @param gap  measures the gap as given
 void complete_each(BlindTruth& truth,
-                   const std::function<double(const std::vector<dynamics::Effect>& others)>& left_beside);
+                   const std::function<double(const std::vector<dynamics::Effect>& others)>& left_beside,
+                   const std::function<GapAsGiven()>& gap);
 
 }  // namespace metastable::analysis

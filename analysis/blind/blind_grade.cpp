@@ -347,6 +347,7 @@ BlindGrades grade(const std::vector<BlindTruth>& truths, const std::vector<std::
   }
   result.grades = measures(tally);
   std::ranges::move(at_work_grades(truths, answers), std::back_inserter(result.grades));
+  std::ranges::move(share_grades(truths, answers), std::back_inserter(result.grades));
   std::ranges::move(steps_grades(truths, answers), std::back_inserter(result.grades));
   for (const auto& [strength, size] : {std::pair{1, &result.mean_set_size_1x}, {2, &result.mean_set_size_2x}})
     if (tally.set_size[strength].second > 0) *size = tally.set_size[strength].first / tally.set_size[strength].second;

@@ -35,6 +35,8 @@ struct BlindAnswer {
   struct SaidAtWork {
     std::vector<std::string> effects;  ///< one, or a group that the data cannot tell apart
     double probability = 0;
+    /// Shares of the held-out gap as given that are closed alone and beside the others, 90 %.
+    std::optional<std::pair<double, double>> alone = {}, beside = {};
   };
   std::vector<SaidAtWork> at_work = {};
   double p_unnamed = 0;

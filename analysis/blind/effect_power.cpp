@@ -79,4 +79,21 @@ double power_left(const Experiment& experiment, const dynamics::NominalValues& t
   return 2 * (with - fit(*model, nuisance, terms_of(*model, kept)).log_likelihood);
 }
 
+GapAsGiven gap_as_given(const TransitionModel& model, const std::vector<double>& nuisance,
+                        const std::vector<EffectTerm>& terms) {
+  const std::vector<double> given = given_values(model);
+  const double without = model.evaluate(given, {}).total();
+  GapAsGiven gap{2 * (model.evaluate(nuisance, terms).total() - without), {}};
+  for (const EffectTerm& term : terms)
+    gap.alone.push_back(2 *
+                        (fit(model, given, {term}, {.count = {}, .refit_nuisances = false}).log_likelihood - without));
+  return gap;
+}
+
+GapAsGiven gap_as_given(const Experiment& experiment, const dynamics::NominalValues& truth,
+                        const std::vector<dynamics::Effect>& effects) {
+  const auto model = wheel_transitions(experiment);
+  return gap_as_given(*model, true_nuisances(*model, contact_of(truth, effects)), terms_of(*model, effects));
+}
+
 }  // namespace metastable::analysis

@@ -37,4 +37,18 @@ double expected_power(const PowerDesign& design, const std::vector<dynamics::Eff
 double power_left(const Experiment& experiment, const dynamics::NominalValues& truth,
                   const std::vector<dynamics::Effect>& effects, const std::vector<dynamics::Effect>& kept = {});
 
+/// Holds what the model as given lacks in likelihood.
+struct GapAsGiven {
+  double all = 0;             ///< 2 log(likelihood of the truth / of the model as given)
+  std::vector<double> alone;  ///< 2 log(likelihood of the model as given with one of the effects / as given)
+};
+
+/// Measures it. Sizes are the true ones in `all`, and fitted in `alone`.
+/// @param nuisance, terms  of the truth
+GapAsGiven gap_as_given(const TransitionModel& model, const std::vector<double>& nuisance,
+                        const std::vector<EffectTerm>& terms);
+/// Does so for a wheel.
+GapAsGiven gap_as_given(const Experiment& experiment, const dynamics::NominalValues& truth,
+                        const std::vector<dynamics::Effect>& effects);
+
 }  // namespace metastable::analysis

@@ -175,6 +175,12 @@ void size_walker_outside(const BlindPlan& plan, double target, BlindDice& dice, 
   design.reality.outside = {*truth.outside};
 }
 
+GapAsGiven walk_gap_as_given(const Walks& walks, const Spread& slope_deg,
+                             const std::vector<dynamics::Effect>& effects) {
+  const auto model = machine_transitions(walks.machine, walks.runs);
+  return gap_as_given(*model, true_slope(*model, slope_with(slope_deg, effects)), walk_terms(*model, effects));
+}
+
 // Runs the walks of a case again until its expected steps are known to some 7 %, or some seconds were spent on it.
 void count_falls(BlindTruth& truth, WalkDesign design) {
   constexpr double enough_falls = 200, most_steps = 12000;
@@ -232,8 +238,9 @@ void complete_walker_truth(BlindCase& made) {
 }
 
 void complete_each(BlindTruth& truth, const Walks& walks) {
-  complete_each(truth,
-                [&](const auto& others) { return walk_power_left(walks, *truth.slope_deg, truth.effects, others); });
+  complete_each(
+      truth, [&](const auto& others) { return walk_power_left(walks, *truth.slope_deg, truth.effects, others); },
+      [&] { return walk_gap_as_given(walks, *truth.slope_deg, truth.effects); });
 }
 
 double walk_power_left(const Walks& walks, const Spread& slope_deg, const std::vector<dynamics::Effect>& effects,

@@ -110,9 +110,13 @@ analysis::BlindAnswer read_answer(const std::string& file, std::string_view text
     }
     if (j.contains("cause_set_alike")) answer.alike = j.at("cause_set_alike").get<std::vector<std::string>>();
     if (j.contains("at_work"))
-      for (const ordered_json& one : j.at("at_work"))
-        answer.at_work.push_back(
-            {one.at("effects").get<std::vector<std::string>>(), one.at("probability").get<double>()});
+      for (const ordered_json& one : j.at("at_work")) {
+        const ordered_json closes =
+            one.value("closes", ordered_json::object()).value("interval_90", ordered_json::object());
+        answer.at_work.push_back({one.at("effects").get<std::vector<std::string>>(),
+                                  one.at("probability").get<double>(), interval(closes.value("alone", ordered_json())),
+                                  interval(closes.value("beside", ordered_json()))});
+      }
     answer.p_unnamed = j.value("p_unnamed", 0.0);
     if (j.contains("steps_before_failure")) {
       const ordered_json& steps = j.at("steps_before_failure");

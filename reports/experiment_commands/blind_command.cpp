@@ -360,7 +360,7 @@ void require_answers(const BlindRequest& request, const Places& places, std::siz
 void complete_truths(const Places& places, std::vector<analysis::BlindTruth>& truths, int threads) {
   markov::parallel_for(truths.size(), threads, [&places, &truths](std::size_t i) {
     analysis::BlindTruth& truth = truths[i];
-    if (truth.effects.size() < 2 && truth.kind != analysis::BlindKind::mixed) return;
+    if (truth.effects.empty()) return;
     const fs::path folder = places.case_folder(truth.number);
     if (truth.slope_deg)
       analysis::complete_each(truth, *analysis::read_walks(folder));

@@ -221,8 +221,17 @@ TEST(EffectPower, OfAPairEachEffectIsWeighedBesideTheOther) {
     EXPECT_GT(left, 16);
     EXPECT_LT(left, made.truth.left);
   }
+  // The stated contact is another one here or the same: what recalibration takes up comes on top.
+  ASSERT_TRUE(made.truth.gap_as_given);
+  ASSERT_EQ(made.truth.gap_as_given->alone.size(), 2U);
+  EXPECT_GT(made.truth.gap_as_given->all, 0.9 * made.truth.left);
+  for (const double alone : made.truth.gap_as_given->alone) {
+    EXPECT_GT(alone, 16);
+    EXPECT_LT(alone, made.truth.gap_as_given->all);
+  }
   BlindTruth none;
   complete_each(none, read(made));
+  EXPECT_FALSE(none.gap_as_given);
   EXPECT_TRUE(none.left_by_effect.empty());
 }
 

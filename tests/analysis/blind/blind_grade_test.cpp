@@ -196,5 +196,22 @@ TEST(BlindGrade, ExpectedSteps) {
   expect(g, "  as narrow as twice the trials would count them, nothing outside the catalogue", 1, 2);
 }
 
+// A pair of which one closes a third alone and a sixth beside the other; one is told by a group, which has no share of
+// its own.
+TEST(BlindGrade, SharesThatEffectsClose) {
+  BlindTruth pair = truth(BlindKind::pair, {"bounce", "inertia"}, 2);
+  pair.gap_as_given = GapAsGiven{300, {100, 250}};
+  pair.left_by_effect = {50, 200};
+  BlindAnswer one = said(Verdict::explained, {"bounce+inertia"}), group = one, doubted = one;
+  one.at_work = {{{"bounce"}, 0.9, std::pair{0.3, 0.35}, std::pair{0.2, 0.3}},
+                 {{"inertia"}, 1, std::pair{0.8, 0.9}, std::nullopt},
+                 {{"air_drag"}, 1, std::pair{0.0, 1.0}, std::pair{0.0, 1.0}}};
+  group.at_work = {{{"bounce", "air_drag"}, 1, std::pair{0.0, 1.0}, std::pair{0.0, 1.0}}};
+  doubted.at_work = {{{"bounce"}, 0.7, std::pair{0.0, 1.0}, std::pair{0.0, 1.0}}};
+  const BlindGrades g = grade({pair, pair, pair, truth(BlindKind::none, {}, 0)}, {one, group, doubted, one});
+  expect(g, "shares of the gap that effects close alone: 90 % intervals hold", 2, 2);
+  expect(g, "  beside the others", 0, 1);
+}
+
 }  // namespace
 }  // namespace metastable::analysis::test
