@@ -313,7 +313,9 @@ std::optional<double> RodWalker::landing(double passed, const State& end) const 
   }
   const double time = from + crossing([&](double t) { return slope(moved(from + t)); }, passed - from, before, after);
   const State at = moved(time);
-  if (!(lead(at) > 0 && std::abs(height(at)) < ground)) return std::nullopt;
+  // A shorter leg may come down as it passes the other one: its foot is still behind the hip then.
+  const bool before_hip = at[2 + 2 * static_cast<std::size_t>(1 - stance_)] > at[0];
+  if (!(lead(at) > 0 && before_hip && std::abs(height(at)) < ground)) return std::nullopt;
   return time;
 }
 

@@ -215,36 +215,50 @@ std::optional<double> strike_time(const Motion& m, std::size_t lane, double step
   return time;
 }
 
-/// The same where the swing leg is `ratio` times as long as the stance leg: its foot is over the ground by cos theta -
-/// ratio cos psi stance legs, and before the stance foot by ratio sin psi - sin theta.
+/// The height of a swing foot over the ground, cos theta - ratio cos psi stance legs; over the sine of half the angle
+/// between the legs, where these are apart: what is left for equal ones is their sum theta + psi, more or less.
+struct FootHeight {
+  const Motion& m;
+  std::size_t lane;
+  double ratio;  ///< length of the swing leg over that of the stance leg
+  bool divided = false;
+
+  std::pair<double, double> with_rate(double t) const {
+    const double theta = at(m.theta, lane, t), psi = at(m.psi, lane, t);
+    const double omega = at(m.omega, lane, t), nu = at(m.nu, lane, t);
+    const double height = std::cos(theta) - ratio * std::cos(psi);
+    const double rate = ratio * std::sin(psi) * nu - std::sin(theta) * omega;
+    if (!divided) return {height, rate};
+    const double half = 0.5 * (psi - theta), apart = std::sin(half), value = height / apart;
+    return {value, (rate - value * 0.5 * std::cos(half) * (nu - omega)) / apart};
+  }
+};
+
+/// The same where the legs differ. The foot is before the stance foot by ratio sin psi - sin theta. It strikes while it
+/// is before the hip: as the legs pass each other, which equal ones do with both feet at one place, a shorter one may
+/// come down, too.
 std::optional<double> strike_time(const Motion& m, std::size_t lane, double step, const Motion& end, double ratio) {
-  struct Height {
-    const Motion& m;
-    std::size_t lane;
-    double ratio;
-    std::pair<double, double> with_rate(double t) const {
-      const double theta = at(m.theta, lane, t), psi = at(m.psi, lane, t);
-      return {std::cos(theta) - ratio * std::cos(psi),
-              ratio * std::sin(psi) * at(m.nu, lane, t) - std::sin(theta) * at(m.omega, lane, t)};
-    }
-  };
-  const Height height{m, lane, ratio};
+  const double swings = m.psi[0][lane], swung = end.psi[0][lane];
+  if (!(swings > 0 || swung > 0)) return std::nullopt;
+  const Course swing(m.psi, m.psi, 0, lane);
+  double low = swings > 0 ? 0 : falling_root(0, step, swings, swung, swing, -1);
+  const double until = swung > 0 ? step : falling_root(0, step, swings, swung, swing);
+  FootHeight height{m, lane, ratio};
+  if (height.with_rate(until).first > 0) return std::nullopt;
+  height.divided = at(m.psi, lane, low) > at(m.theta, lane, low);
   const auto over = [&](double t) { return height.with_rate(t).first; };
   const auto rate = [&](double t) { return height.with_rate(t).second; };
-  const double ends = std::cos(end.theta[0][lane]) - ratio * std::cos(end.psi[0][lane]);
-  if (ends > 0) return std::nullopt;
-  double low = 0;
-  if (!(over(0) > 0)) {
+  if (!(over(low) > 0)) {
     // The foot may have risen and come down within the step; it is highest where halved intervals of the rate lead.
-    if (!(rate(0) > 0 && rate(step) < 0)) return std::nullopt;
-    double high = step;
+    if (!(rate(low) > 0 && rate(until) < 0)) return std::nullopt;
+    double high = until;
     for (int halving = 0; halving < 50; ++halving) {
       const double middle = 0.5 * (low + high);
       (rate(middle) > 0 ? low : high) = middle;
     }
     if (!(over(low) > 0)) return std::nullopt;
   }
-  const double time = falling_root(low, step, over(low), ends, height);
+  const double time = falling_root(low, until, over(low), over(until), height);
   const double theta = at(m.theta, lane, time);
   if (!(ratio * std::sin(at(m.psi, lane, time)) > std::sin(theta) && std::cos(theta) > 0)) return std::nullopt;
   return time;
