@@ -12,7 +12,9 @@
 #include <set>
 #include <string>
 
+#include "analysis/blind/effect_power.h"
 #include "analysis/experiment/input_error.h"
+#include "analysis/fitting/model_fit.h"
 #include "analysis/machine_model/machine_transitions.h"
 #include "analysis/walker_model/walker_experiment.h"
 #include "dynamics/catalogue/walker_effects.h"
@@ -296,6 +298,27 @@ TEST_F(WalkFolder, TheLaboratorysWalksAreReadWithWhatIsTold) {
               laboratory_walks(laboratory, trials, statement, {"leg"});
             }).find("--drop: 'leg' is none of phase, time_s, position_m, outcome"),
             std::string::npos);
+}
+
+// An effect of next to no size leaves the likelihood as it was: one that costs something by being there is never named.
+TEST_F(WalkFolder, EffectsBeginAtNothing) {
+  write(drawn());
+  const auto walks = read_walks(folder_);
+  const auto model = machine_transitions(walks->machine, walks->runs);
+  const std::vector<double> nuisance = nominal_values(*model);
+  const double without = model->evaluate(nuisance, std::vector<EffectTerm>{}).total();
+  int tried = 0;
+  for (const dynamics::EffectInfo& info : dynamics::walker_effects()) {
+    const auto candidate = std::ranges::find(model->candidates(), info.id, &Candidate::id);
+    if (candidate == model->candidates().end() || !candidate->undecidable.empty()) continue;
+    std::vector<double> values;
+    for (const dynamics::EffectParameter& p : info.parameters)
+      values.push_back(*p.neutral + (p.place ? 0 : 1e-9 * p.upper));
+    const EffectTerm term = fitted_term(*model, {info.id, values});
+    EXPECT_NEAR(model->evaluate(nuisance, std::vector{term}).total(), without, 1e-3) << info.id;
+    ++tried;
+  }
+  EXPECT_GT(tried, 20);
 }
 
 // One leg has more mass: the diagnosis names it with its size.
