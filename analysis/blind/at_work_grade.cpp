@@ -106,7 +106,7 @@ std::vector<Grade> share_grades(const std::vector<BlindTruth>& truths, const std
   };
   for (std::size_t i = 0; i < truths.size(); ++i) {
     const BlindTruth& truth = truths[i];
-    if (!answers[i] || !truth.gap_as_given) continue;
+    if (!answers[i] || !truth.gap_as_given || truth.gap_as_given->all < power_of_one) continue;
     for (const BlindAnswer::SaidAtWork& said : answers[i]->at_work)
       for (std::size_t e = 0; e < truth.effects.size(); ++e) {
         if (said.probability < Rules{}.least_at_work || said.effects != std::vector{truth.effects[e].id}) continue;
