@@ -20,8 +20,8 @@ namespace {
 constexpr double claim = 0.05;          // adjusted p-value of a claim of where
 constexpr double no_power_left = 9;     // 2 Delta log likelihood after recalibration: nobody finds that reliably
 constexpr double pair_power_left = 16;  // of each of two effects beside the other: 1x
-constexpr const char* of_the_diagnosis = "diagnosis, first of its set";  // the way
-constexpr double alike_share = 0.25;  // of the cause sets of an effect that another one must be in
+constexpr double alike_share = 0.25;    // of the cause sets of an effect that another one must be in
+constexpr const char* diagnosis_way = "diagnosis, first of its set";
 
 bool contains(const std::vector<std::string>& list, const std::string& one) {
   return std::find(list.begin(), list.end(), one) != list.end();
@@ -199,7 +199,7 @@ Groups ambiguity_groups(const std::vector<BlindTruth>& truths, const std::vector
 // Lists the effects that one way of answering names: none where the answer does not tell of a criterion.
 std::vector<std::string> named_by(const std::string& way, const BlindAnswer& answer) {
   if (const auto found = answer.stepwise.find(way); found != answer.stepwise.end()) return found->second;
-  if (way != of_the_diagnosis) return {};
+  if (way != diagnosis_way) return {};
   if (answer.cause_set.empty() || !is_gap(answer.verdict)) return {};
   return effects_of_cause(answer.cause_set.front());
 }
@@ -236,7 +236,7 @@ void count_way(WayGrade& grade, const BlindTruth& truth, const std::vector<std::
 // Sets the diagnosis beside the criteria that all answers tell of, over the cases that were answered.
 std::vector<WayGrade> ways(const std::vector<BlindTruth>& truths, const std::vector<Answer>& answers) {
   std::vector<WayGrade> all(1);
-  all.front().way = of_the_diagnosis;
+  all.front().way = diagnosis_way;
   for (const Answer& answer : answers)
     if (answer) {
       for (const auto& [criterion, effects] : answer->stepwise) all.emplace_back().way = criterion;

@@ -43,11 +43,11 @@ struct GapAsGiven {
   std::vector<double> alone;  ///< 2 log(likelihood of the model as given with one of the effects / as given)
 };
 
-/// Measures it. Sizes are the true ones in `all`, and fitted in `alone`.
+/// Measures what the model as given lacks. Sizes are the true ones in `all`, and fitted in `alone`, a fit an effect.
 /// @param nuisance, terms  of the truth
 GapAsGiven gap_as_given(const TransitionModel& model, const std::vector<double>& nuisance,
                         const std::vector<EffectTerm>& terms);
-/// Does so for a wheel.
+/// Measures what a wheel's model as given lacks on an experiment.
 GapAsGiven gap_as_given(const Experiment& experiment, const dynamics::NominalValues& truth,
                         const std::vector<dynamics::Effect>& effects);
 

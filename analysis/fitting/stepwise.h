@@ -11,7 +11,7 @@ struct Fit;
 struct CauseRanking;
 
 struct StepwiseChoice {
-  std::string criterion;             ///< "AICc" or "BIC"
+  std::string criterion;             ///< "AICc" or "BIC", or what selects by another way
   std::vector<std::string> effects;  ///< ids, in the order they came in; none: the recalibrated model
 };
 

@@ -17,10 +17,12 @@
 namespace metastable::analysis {
 namespace {
 
-constexpr double of_a_failure = 10;      // sds: the residual where the map fails and the machine did not
-constexpr int most_moves = 20;           // of Gauss and Newton, in one fit
-constexpr double least_fall = 1e-8;      // of the sum of squares, by its share: a step that brings less is the last
-constexpr double shortest_step = 0.01;   // of Gauss and Newton's, that is tried
+constexpr std::size_t fewest_residuals = 30, most_residuals = 10000;
+constexpr double of_a_failure = 10;      // the residual, in sds, of a step where the map fails and the machine did not
+constexpr int most_moves = 20;           // of one fit
+constexpr double least_fall = 1e-8;      // of the sum of squares, by its share: a move that brings less is the last
+constexpr double shortest_step = 0.01;   // that is tried, as a share of Gauss and Newton's
+constexpr double least_scatter = 1e-9;   // of a column, as a share of its largest residual: below it there is none
 constexpr double nuisance_step = 1e-3;   // of the sd with which a parameter is known, for differences
 constexpr double least_promise = 1;      // fall of n log(sum) to first order, for a fit
 constexpr std::size_t most_fits = 5;     // of sets with one more effect
@@ -169,7 +171,7 @@ class SquaresSelection {
   bool changes_the_state(const MachineCandidate& one) const {
     MachineHypothesis h = hypothesis({}, nominal());
     std::vector<double> values;
-    for (const FreeParameter& p : one.candidate.parameters) values.push_back(p.neutral);
+    for (const FreeParameter& p : one.candidate.parameters) values.push_back(p.neutral + p.step);
     one.apply(h, one.candidate.variants.front(), values);
     return !h.spreads.empty() || !h.memory.empty();
   }
@@ -218,7 +220,8 @@ class SquaresSelection {
       Eigen::MatrixXd rows = all[b](kept, Eigen::all);
       rows.rowwise() -= rows.colwise().mean().eval();
       const Eigen::RowVectorXd sd = rows.colwise().norm() / std::sqrt(static_cast<double>(rows.rows()));
-      sd_[b] = (sd.array() > 0).select(sd, 1);
+      const Eigen::RowVectorXd largest = all[b](kept, Eigen::all).cwiseAbs().colwise().maxCoeff();
+      sd_[b] = (sd.array() > least_scatter * largest.array()).select(sd, 1);
     }
   }
 
@@ -253,6 +256,7 @@ class SquaresSelection {
     SquaresFit fit{std::move(members), std::move(start), {}, 0};
     fit.residual = weighed(fit.members, fit.at);
     const std::vector<FreeParameter> free = unknowns(fit.members);
+    if (free.empty()) return fit;
     for (int i = 0; i < most_moves; ++i) {
       Eigen::MatrixXd slope = slopes(fit);
       Eigen::VectorXd size = slope.colwise().norm();
@@ -312,9 +316,12 @@ class SquaresSelection {
   const std::vector<SquaresFit>& one_more(const SquaresFit& fit) {
     const auto [known, fresh] = tried_.try_emplace(ids(fit.members));
     if (!fresh) return known->second;
-    const Eigen::ColPivHouseholderQR<Eigen::MatrixXd> qr(slopes(fit));
-    const Eigen::MatrixXd directions =
-        qr.householderQ() * Eigen::MatrixXd::Identity(fit.residual.size(), static_cast<Eigen::Index>(qr.rank()));
+    Eigen::MatrixXd directions(fit.residual.size(), 0);
+    if (fit.at.size() > 0) {
+      const Eigen::ColPivHouseholderQR<Eigen::MatrixXd> qr(slopes(fit));
+      directions =
+          qr.householderQ() * Eigen::MatrixXd::Identity(fit.residual.size(), static_cast<Eigen::Index>(qr.rank()));
+    }
     std::vector<Promised> promised;
     for (const MachineCandidate& effect : effects_) {
       if (std::ranges::find(fit.members, &effect, &SetMember::effect) != fit.members.end()) continue;
@@ -356,7 +363,9 @@ std::vector<StepwiseChoice> least_squares_selection(const Machine& machine, cons
   const auto measured = [&](const std::string& state) {
     return std::ranges::find(machine.observe, state, &MachineSensor::state) != machine.observe.end();
   };
-  if (!std::ranges::all_of(machine.states, measured)) return {};
+  const std::size_t residuals = runs.transitions() * machine.observe.size();
+  if (!std::ranges::all_of(machine.states, measured) || residuals < fewest_residuals || residuals > most_residuals)
+    return {};
   SquaresSelection selection(machine, runs, catalogue);
   if (!selection.possible()) return {};
   return {{"Gauss-Newton AICc", selection.chosen(corrected_akaike)}, {"Gauss-Newton BIC", selection.chosen(schwarz)}};

@@ -15,10 +15,10 @@ namespace metastable::analysis {
 /// held against stated launches in the same way. Selects effects forward, six at most, by AICc and by BIC over the sum
 /// of squares: n log(sum/n) in place of -2 log likelihood, n residuals. Effects of noise alone (spreads, memory,
 /// outliers) leave the residuals as they are and are never named. What the residuals of neighbouring steps and columns
-/// share is no part of it: errors of a measured row pass for effects. A walk's answer takes some seconds.
+/// share is no part of it: errors of a measured row pass for effects. A thousand residuals take half a second.
 /// @param catalogue  ids that may be named; empty: all
-/// @return choices "Gauss-Newton AICc" and "Gauss-Newton BIC"; none where a state is not measured, or without a
-/// residual
+/// @return choices "Gauss-Newton AICc" and "Gauss-Newton BIC"; none where a state is not measured, and of fewer than 30
+/// or more than 10,000 residuals (steps times measured states)
 std::vector<StepwiseChoice> least_squares_selection(const Machine& machine, const MachineRuns& runs,
                                                     const std::vector<std::string>& catalogue);
 

@@ -236,7 +236,7 @@ struct FootHeight {
 
 /// The same where the legs differ. The foot is before the stance foot by ratio sin psi - sin theta. It strikes while it
 /// is before the hip: as the legs pass each other, which equal ones do with both feet at one place, a shorter one may
-/// come down, too.
+/// come down, too. Of a longer swing leg the stance leg may still lean back then.
 std::optional<double> strike_time(const Motion& m, std::size_t lane, double step, const Motion& end, double ratio) {
   const double swings = m.psi[0][lane], swung = end.psi[0][lane];
   if (!(swings > 0 || swung > 0)) return std::nullopt;

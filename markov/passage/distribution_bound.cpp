@@ -257,8 +257,7 @@ Extended variation(const std::vector<double>& distribution, const Row& y) {
 std::string why_not(std::uint32_t state, const BoundedQuasiStationary& found) {
   return fmt::format(
       "survivors come to state {} too slowly for what is known of the failure rate ({:.6g} to {:.6g}): the "
-      "distribution "
-      "has no proven bound",
+      "distribution has no proven bound",
       state, found.rate_lower, found.rate_upper);
 }
 
@@ -301,16 +300,26 @@ void bound_distribution(const Chain& chain, std::span<const Extended> left, std:
     found.unproven = "no state is visited twice: what the last survivors look like depends on the start";
     return;
   }
+  if (chain.size() == 1) {  // there is one distribution
+    found.distribution_error = 0;
+    found.unproven.clear();
+    return;
+  }
   std::uint32_t state = 0;
   for (std::uint32_t i = 0; i < chain.size(); ++i)
     if (left[i] * right[i] > left[state] * right[state]) state = i;
-  found.unproven = why_not(state, found);
+  const auto lost = std::ranges::find(right, Extended{0});
+  found.unproven = lost == right.end() ? why_not(state, found)
+                                       : fmt::format(
+                                             "the survival weight of state {} is none or below all doubles: the "
+                                             "distribution has no proven bound",
+                                             lost - right.begin());
   if (!(left[state] > 0 && right[state] > 0)) return;
   try {
     bounded_by_returns(chain, left, right, way, state, found, heard);
   } catch (const ConvergenceError& error) {
     found.unproven = fmt::format("the distribution has no proven bound: {}", error.what());
-  } catch (const std::domain_error& error) {
+  } catch (const std::logic_error& error) {  // as where numbers of an elimination are beyond doubles
     found.unproven = fmt::format("the distribution has no proven bound: {}", error.what());
   }
   if (std::isfinite(found.distribution_error)) found.unproven.clear();

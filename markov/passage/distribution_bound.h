@@ -28,7 +28,7 @@ namespace metastable::markov {
 /// from its residual are tried; how far they lead from what is returned counts.
 ///
 /// Costs one elimination of the chain or its like by iteration, and some five solutions.
-/// @param left, right  vectors that come nearer to the eigenvectors than doubles; size n, >= 0
+/// @param left, right  eigenvectors, as near as they are known; size n, >= 0
 /// @param way  Way::eliminated: in double precision, where extended precision takes more than a second
 void bound_distribution(const Chain& chain, std::span<const Extended> left, std::span<const Extended> right, Way way,
                         BoundedQuasiStationary& found, const Heard& heard = {});

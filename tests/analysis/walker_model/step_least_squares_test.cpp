@@ -92,6 +92,23 @@ TEST(StepLeastSquares, AnEffectComesInForWhatItsParameterCosts) {
   EXPECT_GT(aicc_alone, 0) << "AICc asks for less";
 }
 
+// Nothing is refitted where all parameters are known.
+TEST(StepLeastSquares, AMachineWhoseParametersAreKnownHasAChoice) {
+  Machine known = decaying();
+  known.parameters = {{"decay", 0.85, 0}};
+  const std::vector<StepwiseChoice> choices = least_squares_selection(known, decayed(0.3), {"push"});
+  ASSERT_EQ(choices.size(), 2U);
+  EXPECT_EQ(choices[1].effects, Names{"push"});
+}
+
+// Effects of noise alone leave the residuals as they are.
+TEST(StepLeastSquares, NoiseIsNeverNamed) {
+  Machine machine = decaying();
+  machine.may_vary = {"decay"};
+  const MachineRuns runs = decayed(0);
+  EXPECT_EQ(least_squares_selection(machine, runs, {"decay_spread", "memory", "outliers"}).front().effects, Names{});
+}
+
 TEST(StepLeastSquares, WithoutResidualsThereIsNoChoice) {
   MachineRuns runs = decayed(0);
   for (MachineTrial& trial : runs.trials) trial.rows.resize(1);

@@ -167,6 +167,12 @@ TEST(DistributionBound, HoldsWhereSomeStatesDoNotLeadToOthers) {
   expect_held(chain, 1e-13, "reducible");
 }
 
+TEST(DistributionBound, OfOneStateThereIsOneDistribution) {
+  const BoundedQuasiStationary found = of_eliminated(Chain({0, 0}, {}, {}, {0.001}));
+  EXPECT_EQ(found.distribution_error, 0);
+  EXPECT_TRUE(found.unproven.empty());
+}
+
 // 1100 states that fill in: eliminated in double precision, as extended precision takes longer, and iterated.
 TEST(DistributionBound, IsNarrowForLargeChainsEitherWay) {
   const Chain chain = reference::sparse_chain({1100, 7, 1e-6, 1, 1e-9, 0});
