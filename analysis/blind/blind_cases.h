@@ -61,8 +61,8 @@ struct BlindTruth {
   /// The power left of each of several effects, after a recalibration that has the others in the model. It follows from
   /// the rest and the case and is not sealed; empty until complete_each().
   std::vector<double> left_by_effect = {};
-  /// What the model as given lacks in likelihood, by effect. It is not sealed, as it follows from the case; nothing
-  /// until complete_each(), and where something acts from outside or is recalibrated.
+  /// The likelihood that the model as given lacks, and each effect's part of it. It follows from the case and is not
+  /// sealed. It is empty until complete_each(), and where something acts from outside or is recalibrated.
   std::optional<GapAsGiven> gap_as_given = {};
   /// Collisions at risk and rests of the same experiment, run again and again in the laboratory: their ratio is the
   /// machine's expected steps. 0 where it was not run.

@@ -212,7 +212,8 @@ Weighing weighing(const Chain& chain, const Row& y, const Row& w, Extended shift
   return weighed;
 }
 
-/// What is proven of one left vector: sum |d|, of a sum of one, and how far the failure rate is from its shift.
+/// Holds what is proven of one left vector: its sum |d| where its entries sum to one, and how far the failure rate is
+/// from its shift.
 struct Proven {
   Extended error = unbounded, shift = 0, rate_off = 1;
 };

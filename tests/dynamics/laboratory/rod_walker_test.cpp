@@ -146,15 +146,25 @@ double momentum(const std::vector<RodPoint>& points, double x, double y) {
   return sum;
 }
 
+// The place of the foot that strikes next, and the points just before the strike and just after it.
+struct Strike {
+  double foot = 0;
+  std::vector<RodPoint> before, after;
+};
+
+Strike struck(RodWalker& walker) {
+  EXPECT_TRUE(walker.reach_strike(slope));
+  Strike found{walker.swing_foot(), walker.points(), {}};
+  walker.strike();
+  found.after = walker.points();
+  return found;
+}
+
 TEST(RodWalker, AStrikeKeepsTheMomentaAboutTheStruckFootAndOfTheNewSwingLegAboutTheHip) {
   RodWalkerOptions real;
   real.legs[1] = {4, 0.6, 0.4};
   RodWalker walker(real, 0, gait);
-  ASSERT_TRUE(walker.reach_strike(slope));
-  const double foot = walker.swing_foot();
-  const std::vector<RodPoint> before = walker.points();
-  walker.strike();
-  const std::vector<RodPoint> after = walker.points();
+  const auto [foot, before, after] = struck(walker);
   EXPECT_NEAR(walker.position(), foot, 1e-12);
   EXPECT_NEAR(momentum(after, foot, 0), momentum(before, foot, 0), 1e-12 * std::abs(momentum(before, foot, 0)));
   const auto of_leg = [](const std::vector<RodPoint>& p) { return momentum({p[1]}, p[0].x, p[0].y); };
@@ -287,16 +297,12 @@ TEST(RodWalker, AKneeTakesEnergyByItsDamperAlone) {
   EXPECT_NEAR(before - last, taken, 1e-3 * taken);
 }
 
+// The hip and the other leg keep their momentum about the knee, and the whole walker keeps its own about the struck foot.
 TEST(RodWalker, AStrikeBearsNoMomentAtAKneeThatGives) {
-  // What hangs from the knee keeps its momentum about it, and all keep theirs about the struck foot.
   RodWalkerOptions real;
   real.knee_compliance = 1e-3;
   RodWalker walker(real, 0, gait);
-  ASSERT_TRUE(walker.reach_strike(slope));
-  const double foot = walker.swing_foot();
-  const std::vector<RodPoint> before = walker.points();
-  walker.strike();
-  const std::vector<RodPoint> after = walker.points();
+  const auto [foot, before, after] = struck(walker);
   const auto above = [](const std::vector<RodPoint>& p) { return momentum({p[0], p[1]}, p[2].x, p[2].y); };
   EXPECT_NEAR(above(after), above(before), 1e-12 * std::abs(above(before)));
   EXPECT_NEAR(momentum(after, foot, 0), momentum(before, foot, 0), 1e-12 * std::abs(momentum(before, foot, 0)));
