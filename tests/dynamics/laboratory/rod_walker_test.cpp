@@ -297,7 +297,7 @@ TEST(RodWalker, AKneeTakesEnergyByItsDamperAlone) {
   EXPECT_NEAR(before - last, taken, 1e-3 * taken);
 }
 
-// The hip and the other leg keep their momentum about the knee, and the whole walker keeps its own about the struck foot.
+// Hip and other leg keep their momentum about the knee, and the whole walker keeps its own about the struck foot.
 TEST(RodWalker, AStrikeBearsNoMomentAtAKneeThatGives) {
   RodWalkerOptions real;
   real.knee_compliance = 1e-3;
