@@ -68,10 +68,5 @@ TEST(EngineDiagnosis, TorquesMakeTheWheelRestAsOftenAsTheModelSays) {
   expect_steps({.trials = 60, .seed = 5, .viscous_drag = 0.016}, "axle_drag_viscous", 0.016);
 }
 
-// Two minutes, so that it is run by hand: fewer trials do not tell a wheel that remembers from one that forgets.
-TEST(EngineDiagnosis, DISABLED_FootholdsThatRememberMakeItRestAsOftenAsTheModelSays) {
-  expect_steps({.trials = 300, .seed = 7, .memory = 0.8}, "contact_memory", 0.8);
-}
-
 }  // namespace
 }  // namespace metastable::analysis
