@@ -7,15 +7,24 @@
 #include <optional>
 #include <utility>
 
+// Sixteen walkers side by side where the processor has vectors of eight numbers, else eight; the bits are the same.
+#ifdef METASTABLE_AVX2
+#define METASTABLE_WIDEST __attribute__((target("avx512f")))
+#else
+#define METASTABLE_WIDEST
+#endif
+
 namespace metastable::dynamics {
 namespace {
 
 constexpr int order = 12;
-constexpr std::size_t vector_width = 4, vectors = 2, width = vectors * vector_width;
-/// Holds a number of each of four walkers side by side.
-using Lanes = double __attribute__((vector_size(vector_width * sizeof(double))));
+constexpr std::size_t vectors = 2;
+/// Hold a number of each of four or eight walkers side by side.
+using Four = double __attribute__((vector_size(4 * sizeof(double))));
+using Eight = double __attribute__((vector_size(8 * sizeof(double))));
 
 /// Holds a quantity's Taylor coefficients.
+template <class Lanes>
 using Series = std::array<Lanes, order + 1>;
 
 /// Holds 1 / k.
@@ -25,24 +34,27 @@ constexpr std::array<double, order + 1> shares = [] {
   return list;
 }();
 
-/// Holds angles, rates, and the sines and cosines that the equations need, of four walkers as series in time.
+/// Holds angles, rates, and the sines and cosines that the equations need, of walkers side by side as series in time.
+template <class Lanes>
 struct Motion {
-  Series theta, psi, omega, nu;     ///< stance and swing angle, their rates
-  Series sin_theta, cos_theta;      ///< of theta - gamma
-  Series sin_psi, cos_psi;          ///< of psi - gamma
-  Series sin_between, cos_between;  ///< of theta - psi
-  Series between, product;          ///< omega - nu; omega nu
-  Lanes turning, inverse;           ///< of the series' recurrence
+  Series<Lanes> theta, psi, omega, nu;     ///< stance and swing angle, their rates
+  Series<Lanes> sin_theta, cos_theta;      ///< of theta - gamma
+  Series<Lanes> sin_psi, cos_psi;          ///< of psi - gamma
+  Series<Lanes> sin_between, cos_between;  ///< of theta - psi
+  Series<Lanes> between, product;          ///< omega - nu; omega nu
+  Lanes turning, inverse;                  ///< of the series' recurrence
 };
 
-/// Holds the equations of four walkers; `torque` is that of a hip that resists turning with a constant size, with its
-/// sign.
+/// Holds the equations of walkers side by side; `torque` is that of a hip that resists turning with a constant size,
+/// with its sign.
+template <class Lanes>
 struct Equations {
   Lanes p, q, r, w, stance_damping, swing_damping, stance_torque, swing_torque;
 };
 
 /// Prepares the series from their first coefficients.
-inline __attribute__((always_inline)) void begin(Motion& m, const Equations& e) {
+template <class Lanes>
+inline __attribute__((always_inline)) void begin(Motion<Lanes>& m, const Equations<Lanes>& e) {
   const Lanes c0 = m.cos_between[0];
   m.between[0] = m.omega[0] - m.nu[0];
   m.product[0] = m.omega[0] * m.nu[0];
@@ -54,8 +66,8 @@ inline __attribute__((always_inline)) void begin(Motion& m, const Equations& e) 
 ///   (omega - p cos x nu)' = q sin(theta - gamma) - T / A + p sin x omega nu,
 ///   (nu - r cos x omega)' = -w sin(psi - gamma) + T / C - r sin x omega nu,
 /// nine products of series, of which those of cos x with both rates serve (sin x)' too.
-template <bool with_hip>
-inline __attribute__((always_inline)) void extend(Motion& m, const Equations& e, std::size_t k) {
+template <bool with_hip, class Lanes>
+inline __attribute__((always_inline)) void extend(Motion<Lanes>& m, const Equations<Lanes>& e, std::size_t k) {
   const Lanes c0 = m.cos_between[0], sb0 = m.sin_between[0], omega0 = m.omega[0], nu0 = m.nu[0];
   Lanes s1 = m.cos_theta[0] * m.omega[k], c1 = m.sin_theta[0] * m.omega[k], s2 = m.cos_psi[0] * m.nu[k],
         c2 = m.sin_psi[0] * m.nu[k], c3 = sb0 * m.between[k], force = sb0 * m.product[k], by_nu = {}, by_omega = {},
@@ -102,15 +114,27 @@ inline __attribute__((always_inline)) void extend(Motion& m, const Equations& e,
 
 /// Fills the series from their first coefficients: while the results of one vector of walkers are waited for, those of
 /// the other are at work.
-template <bool with_hip>
-METASTABLE_WIDE void expand(std::array<Motion, vectors>& m, const std::array<Equations, vectors>& e) {
+template <bool with_hip, class Lanes>
+inline __attribute__((always_inline)) void fill(std::array<Motion<Lanes>, vectors>& m,
+                                                const std::array<Equations<Lanes>, vectors>& e) {
   for (std::size_t v = 0; v < vectors; ++v) begin(m[v], e[v]);
   for (std::size_t k = 0; k < order; ++k)
     for (std::size_t v = 0; v < vectors; ++v) extend<with_hip>(m[v], e[v], k);
 }
 
+template <bool with_hip>
+METASTABLE_WIDE void expand(std::array<Motion<Four>, vectors>& m, const std::array<Equations<Four>, vectors>& e) {
+  fill<with_hip>(m, e);
+}
+
+template <bool with_hip>
+METASTABLE_WIDEST void expand(std::array<Motion<Eight>, vectors>& m, const std::array<Equations<Eight>, vectors>& e) {
+  fill<with_hip>(m, e);
+}
+
 /// Sets the first coefficients of `end` to the motion `time` later.
-METASTABLE_WIDE void advance(const Motion& m, const Lanes& time, Motion& end) {
+template <class Lanes>
+inline __attribute__((always_inline)) void sum_up(const Motion<Lanes>& m, const Lanes& time, Motion<Lanes>& end) {
   Lanes theta = m.theta[order], psi = m.psi[order], omega = m.omega[order], nu = m.nu[order],
         sin_theta = m.sin_theta[order], cos_theta = m.cos_theta[order], sin_psi = m.sin_psi[order],
         cos_psi = m.cos_psi[order];
@@ -136,7 +160,11 @@ METASTABLE_WIDE void advance(const Motion& m, const Lanes& time, Motion& end) {
   end.cos_between[0] = cos_theta * cos_psi + sin_theta * sin_psi;
 }
 
-void start(Motion& m, std::size_t lane, const LegMotion& from, double slope) {
+METASTABLE_WIDE void advance(const Motion<Four>& m, const Four& time, Motion<Four>& end) { sum_up(m, time, end); }
+METASTABLE_WIDEST void advance(const Motion<Eight>& m, const Eight& time, Motion<Eight>& end) { sum_up(m, time, end); }
+
+template <class Lanes>
+void start(Motion<Lanes>& m, std::size_t lane, const LegMotion& from, double slope) {
   const double theta = from.stance_angle, psi = from.swing_angle;
   m.theta[0][lane] = theta;
   m.psi[0][lane] = psi;
@@ -150,7 +178,8 @@ void start(Motion& m, std::size_t lane, const LegMotion& from, double slope) {
   m.cos_between[0][lane] = std::cos(theta - psi);
 }
 
-double at(const Series& series, std::size_t lane, double time) {
+template <class Lanes>
+double at(const Series<Lanes>& series, std::size_t lane, double time) {
   double value = series[order][lane];
   for (std::size_t k = order; k-- > 0;) value = value * time + series[k][lane];
   return value;
@@ -160,7 +189,8 @@ double at(const Series& series, std::size_t lane, double time) {
 class Course {
  public:
   /// Sums or subtracts two quantities.
-  Course(const Series& a, const Series& b, double factor, std::size_t lane) {
+  template <class Lanes>
+  Course(const Series<Lanes>& a, const Series<Lanes>& b, double factor, std::size_t lane) {
     for (std::size_t k = 0; k <= order; ++k) coefficient_[k] = a[k][lane] + factor * b[k][lane];
   }
   /// Returns the value and its derivative.
@@ -197,7 +227,8 @@ double falling_root(double low, double high, double at_low, double at_high, cons
 /// The swing foot is over the ground before the stance foot where theta + psi > 0 and theta < 0, and strikes as that
 /// sum falls to zero. Returns the time of the strike within the step of the series, or nothing. `end` is the motion at
 /// the end of the step.
-std::optional<double> strike_time(const Motion& m, std::size_t lane, double step, const Motion& end) {
+template <class Lanes>
+std::optional<double> strike_time(const Motion<Lanes>& m, std::size_t lane, double step, const Motion<Lanes>& end) {
   const double begins = m.theta[0][lane] + m.psi[0][lane], ends = end.theta[0][lane] + end.psi[0][lane];
   if (ends > 0 || !(end.theta[0][lane] < 0)) return std::nullopt;
   // The foot may have risen and come down within the step.
@@ -217,8 +248,9 @@ std::optional<double> strike_time(const Motion& m, std::size_t lane, double step
 
 /// The height of a swing foot over the ground, cos theta - ratio cos psi stance legs; over the sine of half the angle
 /// between the legs, where these are apart: what is left for equal ones is their sum theta + psi, more or less.
+template <class Lanes>
 struct FootHeight {
-  const Motion& m;
+  const Motion<Lanes>& m;
   std::size_t lane;
   double ratio;  ///< length of the swing leg over that of the stance leg
   bool divided = false;
@@ -237,13 +269,15 @@ struct FootHeight {
 /// The same where the legs differ. The foot is before the stance foot by ratio sin psi - sin theta. It strikes while it
 /// is before the hip: as the legs pass each other, which equal ones do with both feet at one place, a shorter one may
 /// come down, too. Of a longer swing leg the stance leg may still lean back then.
-std::optional<double> strike_time(const Motion& m, std::size_t lane, double step, const Motion& end, double ratio) {
+template <class Lanes>
+std::optional<double> strike_time(const Motion<Lanes>& m, std::size_t lane, double step, const Motion<Lanes>& end,
+                                  double ratio) {
   const double swings = m.psi[0][lane], swung = end.psi[0][lane];
   if (!(swings > 0 || swung > 0)) return std::nullopt;
   const Course swing(m.psi, m.psi, 0, lane);
   double low = swings > 0 ? 0 : falling_root(0, step, swings, swung, swing, -1);
   const double until = swung > 0 ? step : falling_root(0, step, swings, swung, swing);
-  FootHeight height{m, lane, ratio};
+  FootHeight<Lanes> height{m, lane, ratio};
   if (height.with_rate(until).first > 0) return std::nullopt;
   height.divided = at(m.psi, lane, low) > at(m.theta, lane, low);
   const auto over = [&](double t) { return height.with_rate(t).first; };
@@ -265,16 +299,22 @@ std::optional<double> strike_time(const Motion& m, std::size_t lane, double step
 }
 
 /// Returns when within the step the legs' turning against each other changes its sign; nothing if it does not.
-std::optional<double> turning_back(const Motion& m, std::size_t lane, double step, const Motion& end) {
+template <class Lanes>
+std::optional<double> turning_back(const Motion<Lanes>& m, std::size_t lane, double step, const Motion<Lanes>& end) {
   const double before = m.omega[0][lane] - m.nu[0][lane], after = end.omega[0][lane] - end.nu[0][lane];
   if (!(before * after < 0)) return std::nullopt;
   return falling_root(0, step, before, after, Course(m.omega, m.nu, -1, lane), before > 0 ? 1 : -1);
 }
 
-/// Holds eight walkers on their way; one that arrives makes room for the next. A lane without a walker goes on with the
-/// last one that it had, or with the first of all.
+/// Holds two vectors of walkers on their way; one that arrives makes room for the next. A lane without a walker goes on
+/// with the last one that it had, or with the first of all.
+template <class Lanes>
 class Way {
+  static constexpr std::size_t vector_width = sizeof(Lanes) / sizeof(double);
+
  public:
+  static constexpr std::size_t width = vectors * vector_width;
+
   Way(const LegMotion& from, double slope, const LegEquations& equations, const LegCourse& course) {
     for (std::size_t k = 0; k < width; ++k) set_out(k, from, slope, equations, course);
   }
@@ -316,7 +356,7 @@ class Way {
     return after(lane, *time);
   }
   LegMotion after(std::size_t k, double time) const {
-    const Motion& m = now(k);
+    const Motion<Lanes>& m = now(k);
     const std::size_t lane = k % vector_width;
     return {passed_[k] + time, at(m.theta, lane, time), at(m.psi, lane, time), at(m.omega, lane, time),
             at(m.nu, lane, time)};
@@ -328,9 +368,9 @@ class Way {
   double passed(std::size_t lane) const { return passed_[lane]; }
 
  private:
-  Motion& now(std::size_t lane) { return motions_[at_][lane / vector_width]; }
-  const Motion& now(std::size_t lane) const { return motions_[at_][lane / vector_width]; }
-  const Motion& next(std::size_t lane) const { return motions_[1 - at_][lane / vector_width]; }
+  Motion<Lanes>& now(std::size_t lane) { return motions_[at_][lane / vector_width]; }
+  const Motion<Lanes>& now(std::size_t lane) const { return motions_[at_][lane / vector_width]; }
+  const Motion<Lanes>& next(std::size_t lane) const { return motions_[1 - at_][lane / vector_width]; }
   double step_of(std::size_t lane) const { return steps_[lane / vector_width][lane % vector_width]; }
   void move_on() {
     for (std::size_t v = 0; v < vectors; ++v) advance(motions_[at_][v], steps_[v], motions_[1 - at_][v]);
@@ -374,9 +414,9 @@ class Way {
     if (cut) move_on();
   }
 
-  std::array<std::array<Motion, vectors>, 2> motions_;  // start() and advance() set what expand() takes
-  std::size_t at_ = 0;                                  // which of them are now
-  std::array<Equations, vectors> equations_{};
+  std::array<std::array<Motion<Lanes>, vectors>, 2> motions_;  // start() and advance() set what expand() takes
+  std::size_t at_ = 0;                                         // which of them are now
+  std::array<Equations<Lanes>, vectors> equations_{};
   std::array<std::pair<double, double>, width> friction_{};
   std::array<double, width> sign_{};
   std::array<double, width> swing_ratio_{};
@@ -386,14 +426,12 @@ class Way {
   bool hip_ = false;
 };
 
-}  // namespace
-
-StruckLegs follow_legs(std::span<const LegMotion> from, std::span<const double> slopes,
-                       std::span<const LegEquations> equations, std::span<const LegCourse> courses) {
-  constexpr std::size_t nobody = legs_at_once;
+template <class Lanes>
+StruckLegs follow_side_by_side(std::span<const LegMotion> from, std::span<const double> slopes,
+                               std::span<const LegEquations> equations, std::span<const LegCourse> courses) {
+  constexpr std::size_t nobody = legs_at_once, width = Way<Lanes>::width;
   StruckLegs struck;
-  if (from.empty()) return struck;
-  Way way(from[0], slopes[0], equations[0], courses[0]);
+  Way<Lanes> way(from[0], slopes[0], equations[0], courses[0]);
   std::array<std::size_t, width> walker{};  // of each lane
   std::size_t next = 0;
   const auto set_out = [&](std::size_t lane) {
@@ -421,8 +459,28 @@ StruckLegs follow_legs(std::span<const LegMotion> from, std::span<const double> 
   return struck;
 }
 
+/// Says whether vectors of eight numbers are worked on as one.
+bool has_eight_lanes() {
+#ifdef METASTABLE_AVX2
+  static const bool has = __builtin_cpu_supports("avx512f");
+  return has;
+#else
+  return false;  // put together from smaller ones they are slower than four
+#endif
+}
+
+}  // namespace
+
+StruckLegs follow_legs(std::span<const LegMotion> from, std::span<const double> slopes,
+                       std::span<const LegEquations> equations, std::span<const LegCourse> courses) {
+  if (from.empty()) return {};
+  return from.size() > Way<Four>::width && has_eight_lanes()
+             ? follow_side_by_side<Eight>(from, slopes, equations, courses)
+             : follow_side_by_side<Four>(from, slopes, equations, courses);
+}
+
 LegMotion legs_at(const LegMotion& from, double slope, const LegEquations& equations, double taylor_step, double time) {
-  Way way(from, slope, equations, {taylor_step, time});
+  Way<Four> way(from, slope, equations, {taylor_step, time});
   for (way.go_on(); way.arrival(0) < time; way.go_on()) way.arrive();
   return way.after(0, time - way.passed(0));
 }

@@ -35,7 +35,7 @@ struct LegCourse {
   double swing_ratio = 1;  ///< length of the swing leg over that of the stance leg; no unit
 };
 
-inline constexpr std::size_t legs_at_once = 64;
+inline constexpr std::size_t legs_at_once = 128;
 using StruckLegs = std::array<std::optional<LegMotion>, legs_at_once>;
 
 /// Follows up to legs_at_once walkers to just before their feet strike. The swing foot strikes when it comes down before the

@@ -96,7 +96,8 @@ SimulatedSteps summarize_steps(std::vector<std::uint64_t> steps) {
   simulated.trials = steps.size();
   const auto n = static_cast<double>(steps.size());
   double squares = 0;
-  for (const std::uint64_t s : steps) simulated.mean += static_cast<double>(s) / n;
+  for (const std::uint64_t s : steps) simulated.mean += static_cast<double>(s);
+  simulated.mean /= n;
   for (const std::uint64_t s : steps) squares += std::pow(static_cast<double>(s) - simulated.mean, 2);
   simulated.standard_error = std::sqrt(squares / (n - 1) / n);
   simulated.steps = std::move(steps);

@@ -7,7 +7,6 @@
 #include <limits>
 #include <memory>
 #include <mutex>
-#include <span>
 #include <stdexcept>
 
 #include "markov/mesh/batch_simulation.h"
@@ -27,15 +26,16 @@
 namespace metastable::markov {
 namespace {
 
-constexpr double disagrees = 1.7;      // joint half-widths: 99.9 % of the normal
-constexpr double sampled_windows = 3;  // of guided samples: within one, failures are still few
-constexpr int longest_window = 200;    // of guided samples [steps]
-constexpr double least_even_share =
-    0.5;                              // effective samples a sample: below, their own scatter tells too small an error
-constexpr double sampled_from = 100;  // expected steps above which guided samples settle before they fail
-constexpr double widest = 4;          // of the interval: its end over its beginning, beyond which it is no answer
-constexpr double most_blind = 0.1;    // of the failures, in blind spots: beyond, bands are stepped over
-constexpr double row_error = 5e-4;    // what reading rows off curves may leave, about so much
+constexpr double disagrees = 1.7;         // joint half-widths: 99.9 % of the normal
+constexpr double sampled_windows = 3;     // of guided samples: within one, failures are still few
+constexpr int longest_window = 200;       // of guided samples [steps]
+constexpr double least_even_share = 0.5;  // effective samples a sample: below, their scatter tells too small an error
+constexpr double sampled_from = 100;      // expected steps above which guided samples settle before they fail
+constexpr std::size_t enough_trials =
+    4000;                           // to failure: their mean is as well known (1.6 %) as what guided samples say
+constexpr double widest = 4;        // of the interval: its end over its beginning, beyond which it is no answer
+constexpr double most_blind = 0.1;  // of the failures, in blind spots: beyond, bands are stepped over
+constexpr double row_error = 5e-4;  // what reading rows off curves may leave, about so much
 constexpr std::size_t fewest_shifts = 3;
 constexpr double narrow = 0.01;  // half-width of what a few shifts may say: the parts of a wider one are told by many
 constexpr std::size_t most_trials = 10000000;  // they leave 0.03 % of the steps, and take 80 MB
@@ -44,8 +44,7 @@ constexpr std::size_t most_trials = 10000000;  // they leave 0.03 % of the steps
 constexpr double least_counted_share = 0.5;
 // A pilot of one trial in sixteen, of 8 to 128, sees whether trials end within four times the expected steps: of 8, 7
 // at least do.
-constexpr std::size_t pilot_share = 16;
-constexpr std::size_t pilot_least = 8, pilot_most = 128;
+constexpr std::size_t pilot_share = 16, pilot_least = 8, pilot_most = 128;
 constexpr double pilot_steps = 4;
 // States of a row where the chance of failing jumps, by dimension: of 32 in one dimension shifts differ by 4 per cent.
 constexpr std::array<int, 4> row_states_by_dimension{256, 32, 16, 16};
@@ -237,6 +236,7 @@ class Run {
     work_.replan(simulation_stage, simulated);
     const int forgets = forgetting_steps(std::min(mixing, steps_to_the_orbit()));
     const bool guided = options_.guided_samples > 0 && !several_gaits() && steps > sampled_from &&
+                        allowed / expected < static_cast<double>(enough_trials) &&
                         steps > sampled_windows * std::min(forgets, longest_window);
     work_.replan(guided_stage, guided ? guided_rows(forgets, std::min(forgets, longest_window), 1 / steps) : 0);
     tell();
@@ -296,9 +296,10 @@ class Run {
     steps_[shift][size] = std::log(passage.steps);
     rates_[shift][size] = std::log(passage.failure_rate);
     brackets_[shift][size] = 0.5 * std::log(passage.steps_upper / passage.steps_lower);
-    if (size == 0 && shift == 0) coarsest_.seconds += work_.seconds() - before;
-    if (size == 0 && shift == 0)
+    if (size == 0 && shift == 0) {
+      coarsest_.seconds += work_.seconds() - before;
       study_.blind_spots = find_blind_spots(map_, frames_, mesh, passage.visits, mesh_options(0, 0));
+    }
     const std::lock_guard lock(mutex_);
     if (size == 0 && shift == 0) coarse_mixing_ = passage.mixing_steps;
     if (guides(size, shift)) guide_settled_ = std::move(passage.distribution);
@@ -434,8 +435,7 @@ class Run {
       return;
     }
     std::vector<std::uint64_t> steps;
-    const bool piloted = !map_.dear || !follow_in_time(trials, expected, steps);
-    if (piloted) {
+    if (!map_.dear || !follow_in_time(trials, expected, steps)) {
       count(std::clamp(trials / pilot_share, pilot_least, pilot_most), pilot_steps * expected);
       if (!study_.disagreement.empty()) return;
       steps = follow(trials, longest_trial(expected));
@@ -451,10 +451,11 @@ class Run {
   }
 
   void sample() {
-    if (options_.guided_samples == 0) study_.no_guided = "not asked for";
-    if (options_.guided_samples > 0 && study_.steps.value <= sampled_from)
-      study_.no_guided = "not asked: failures are too frequent";
-    if (several_gaits()) study_.no_guided = "its samples would know one gait";
+    study_.no_guided = options_.guided_samples == 0               ? "not asked for"
+                       : several_gaits()                          ? "its samples would know one gait"
+                       : study_.steps.value <= sampled_from       ? "not asked: failures are too frequent"
+                       : study_.simulated_trials >= enough_trials ? "not asked: direct simulation tells as much"
+                                                                  : "";
     if (!study_.no_guided.empty()) return;
     // It goes from the start to where failures keep their share: the time to forget the start, some times over. A
     // window too short to reach the failures from an ordinary state leaves the weight to a few rare ones, which few

@@ -218,13 +218,17 @@ TEST(UnevenWalker, DoesNotDependOnItsNeighbours) {
   UnevenWalker other;
   other.stance.mass_to_hip = other.swing.mass_to_hip = 0.3;
   other.hip_friction = 1;
-  const std::vector<UnevenWalker> both{other, UnevenWalker{}};
-  const std::vector<double> states{0.2, -1.2, 0.1, gait[0], gait[1], gait[2]};
-  std::vector<double> next(6);
-  std::vector<std::uint8_t> fell(2);
-  step_uneven(both, states, std::vector{slope, slope}, next, fell);
+  std::vector<UnevenWalker> many(20, other);  // more than go side by side
+  many.back() = UnevenWalker{};
+  std::vector<double> states;
+  for (std::size_t i = 0; i + 1 < many.size(); ++i)
+    states.insert(states.end(), {0.2 + 0.003 * static_cast<double>(i), -1.2, 0.1});
+  states.insert(states.end(), gait.begin(), gait.end());
+  std::vector<double> next(states.size());
+  std::vector<std::uint8_t> fell(many.size());
+  step_uneven(many, states, std::vector(many.size(), slope), next, fell);
   const Step alone = step(UnevenWalker{});
-  for (std::size_t i = 0; i < 3; ++i) EXPECT_EQ(next[3 + i], alone.next[i]);
+  for (std::size_t i = 0; i < 3; ++i) EXPECT_EQ(next[next.size() - 3 + i], alone.next[i]);
 }
 
 }  // namespace
