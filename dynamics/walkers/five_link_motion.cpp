@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "dynamics/walkers/side_by_side.h"
+
 namespace metastable::dynamics {
 namespace {
 
@@ -13,11 +15,7 @@ constexpr double lying_rad = 1.2, straight_beyond_rad = -0.5, bent_beyond_rad = 
 
 #define METASTABLE_INLINE inline __attribute__((always_inline))
 
-/// Holds a number of each of four walkers side by side.
-using Lanes = double __attribute__((vector_size(4 * sizeof(double))));
-constexpr std::size_t lanes = 4;
-
-/// Holds five numbers, of one walker or of four.
+/// Holds five numbers, of one walker or of several.
 template <class N>
 using FiveOf = std::array<N, 5>;
 
@@ -148,11 +146,15 @@ METASTABLE_INLINE void run(const BipedEquations& e, const Tilt<N>& tilt, double 
   for (std::size_t j = 0; j < 5; ++j) m.rates[j] = rates[j] + gained[j];
 }
 
-METASTABLE_WIDE void run_four(const BipedEquations& e, const Tilt<Lanes>& tilt, double h, Moving<Lanes>& m) {
-  run<Lanes>(e, tilt, h, m);
+METASTABLE_WIDE void run_on(const BipedEquations& e, const Tilt<Four>& tilt, double h, Moving<Four>& m) {
+  run<Four>(e, tilt, h, m);
 }
 
-void run_one(const BipedEquations& e, const Tilt<double>& tilt, double h, Moving<double>& m) {
+METASTABLE_EIGHT_LANES void run_on(const BipedEquations& e, const Tilt<Eight>& tilt, double h, Moving<Eight>& m) {
+  run<Eight>(e, tilt, h, m);
+}
+
+void run_on(const BipedEquations& e, const Tilt<double>& tilt, double h, Moving<double>& m) {
   run<double>(e, tilt, h, m);
 }
 
@@ -188,7 +190,7 @@ BipedMotion landing(const BipedEquations& e, const Tilt<double>& tilt, const Mov
   Moving<double> m;
   for (int i = 0; i < 60; ++i) {
     m = last;
-    run_one(e, tilt, time, m);
+    run_on(e, tilt, time, m);
     const BipedFoot foot = foot_of(m);
     const double there = foot.height;
     if (std::abs(there) < 1e-14 || high - low < 1e-15) break;
@@ -206,10 +208,12 @@ auto lane_of(const Part& part, std::size_t lane) {
   return five;
 }
 
+template <class Lanes>
 Moving<double> lane_of(const Moving<Lanes>& m, std::size_t lane) {
   return {lane_of(m.angles, lane), lane_of(m.rates, lane), lane_of(m.sine, lane), lane_of(m.cosine, lane)};
 }
 
+template <class Lanes>
 void set_lane(Moving<Lanes>& m, std::size_t lane, const Moving<double>& to) {
   for (std::size_t j = 0; j < 5; ++j) {
     m.angles[j][lane] = to.angles[j];
@@ -236,25 +240,10 @@ std::optional<BipedMotion> look(const BipedEquations& e, double slope, const Mov
   return struck;
 }
 
-}  // namespace
-
-BipedTorques motor_torques(const BipedPosture& posture, const BipedMotion& m, double slope) {
-  Torques<double> t;
-  drive<double>(posture, m.angles, m.rates, slope, t);
-  return {t.stance_knee, t.swing_knee, t.stance_hip, t.swing_hip};
-}
-
-bool upright(const BipedMotion& m) {
-  const Five& q = m.angles;
-  const auto sound = [](double bend) { return bend > straight_beyond_rad && bend < bent_beyond_rad; };
-  return std::abs(0.5 * (q[stance_shank] + q[stance_thigh])) < lying_rad && std::abs(q[torso]) < lying_rad &&
-         sound(q[stance_shank] - q[stance_thigh]) && sound(q[swing_shank] - q[swing_thigh]);
-}
-
-BipedFoot swing_foot(const BipedMotion& motion) { return foot_of(moving(motion)); }
-
-void follow_links(const BipedEquations& equations, std::span<const BipedMotion> from, std::span<const double> slopes,
-                  std::span<std::optional<BipedMotion>> struck) {
+template <class Lanes>
+void follow_side_by_side(const BipedEquations& equations, std::span<const BipedMotion> from,
+                         std::span<const double> slopes, std::span<std::optional<BipedMotion>> struck) {
+  constexpr std::size_t lanes = sizeof(Lanes) / sizeof(double);
   // As one walker is done, the next takes its lane.
   std::array<Walk, lanes> walks;
   Moving<Lanes> m;
@@ -277,7 +266,7 @@ void follow_links(const BipedEquations& equations, std::span<const BipedMotion> 
     }
     if (done == slopes.size()) return;
     const Moving<Lanes> last = m;
-    run_four(equations, tilt, piece_s, m);
+    run_on(equations, tilt, piece_s, m);
     for (std::size_t lane = 0; lane < lanes; ++lane) {
       Walk& walk = walks[lane];
       if (walk.done) continue;
@@ -289,12 +278,37 @@ void follow_links(const BipedEquations& equations, std::span<const BipedMotion> 
   }
 }
 
+}  // namespace
+
+BipedTorques motor_torques(const BipedPosture& posture, const BipedMotion& m, double slope) {
+  Torques<double> t;
+  drive<double>(posture, m.angles, m.rates, slope, t);
+  return {t.stance_knee, t.swing_knee, t.stance_hip, t.swing_hip};
+}
+
+bool upright(const BipedMotion& m) {
+  const Five& q = m.angles;
+  const auto sound = [](double bend) { return bend > straight_beyond_rad && bend < bent_beyond_rad; };
+  return std::abs(0.5 * (q[stance_shank] + q[stance_thigh])) < lying_rad && std::abs(q[torso]) < lying_rad &&
+         sound(q[stance_shank] - q[stance_thigh]) && sound(q[swing_shank] - q[swing_thigh]);
+}
+
+BipedFoot swing_foot(const BipedMotion& motion) { return foot_of(moving(motion)); }
+
+void follow_links(const BipedEquations& equations, std::span<const BipedMotion> from, std::span<const double> slopes,
+                  std::span<std::optional<BipedMotion>> struck) {
+  if (has_eight_lanes())
+    follow_side_by_side<Eight>(equations, from, slopes, struck);
+  else
+    follow_side_by_side<Four>(equations, from, slopes, struck);
+}
+
 BipedMotion links_at(const BipedEquations& equations, const BipedMotion& from, double slope, double time,
                      double longest) {
   Moving<double> m = moving(from);
   const Tilt<double> tilt = tilt_of(slope);
   const auto pieces = static_cast<int>(std::ceil(time / std::min(longest, piece_s)));
-  for (int i = 0; i < pieces; ++i) run_one(equations, tilt, time / pieces, m);
+  for (int i = 0; i < pieces; ++i) run_on(equations, tilt, time / pieces, m);
   return {from.time + time, m.angles, m.rates};
 }
 

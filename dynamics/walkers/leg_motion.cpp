@@ -7,22 +7,13 @@
 #include <optional>
 #include <utility>
 
-// Sixteen walkers side by side where the processor has vectors of eight numbers, else eight; the bits are the same.
-#ifdef METASTABLE_AVX2
-#define METASTABLE_WIDEST __attribute__((target("avx512f")))
-#else
-#define METASTABLE_WIDEST
-#endif
+#include "dynamics/walkers/side_by_side.h"
 
 namespace metastable::dynamics {
 namespace {
 
 constexpr int order = 12;
 constexpr std::size_t vectors = 2;
-/// Hold a number of each of four or eight walkers side by side.
-using Four = double __attribute__((vector_size(4 * sizeof(double))));
-using Eight = double __attribute__((vector_size(8 * sizeof(double))));
-
 /// Holds a quantity's Taylor coefficients.
 template <class Lanes>
 using Series = std::array<Lanes, order + 1>;
@@ -128,7 +119,8 @@ METASTABLE_WIDE void expand(std::array<Motion<Four>, vectors>& m, const std::arr
 }
 
 template <bool with_hip>
-METASTABLE_WIDEST void expand(std::array<Motion<Eight>, vectors>& m, const std::array<Equations<Eight>, vectors>& e) {
+METASTABLE_EIGHT_LANES void expand(std::array<Motion<Eight>, vectors>& m,
+                                   const std::array<Equations<Eight>, vectors>& e) {
   fill<with_hip>(m, e);
 }
 
@@ -161,7 +153,9 @@ inline __attribute__((always_inline)) void sum_up(const Motion<Lanes>& m, const 
 }
 
 METASTABLE_WIDE void advance(const Motion<Four>& m, const Four& time, Motion<Four>& end) { sum_up(m, time, end); }
-METASTABLE_WIDEST void advance(const Motion<Eight>& m, const Eight& time, Motion<Eight>& end) { sum_up(m, time, end); }
+METASTABLE_EIGHT_LANES void advance(const Motion<Eight>& m, const Eight& time, Motion<Eight>& end) {
+  sum_up(m, time, end);
+}
 
 template <class Lanes>
 void start(Motion<Lanes>& m, std::size_t lane, const LegMotion& from, double slope) {
@@ -457,16 +451,6 @@ StruckLegs follow_side_by_side(std::span<const LegMotion> from, std::span<const 
     }
   }
   return struck;
-}
-
-/// Says whether vectors of eight numbers are worked on as one.
-bool has_eight_lanes() {
-#ifdef METASTABLE_AVX2
-  static const bool has = __builtin_cpu_supports("avx512f");
-  return has;
-#else
-  return false;  // put together from smaller ones they are slower than four
-#endif
 }
 
 }  // namespace

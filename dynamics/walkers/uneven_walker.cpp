@@ -9,7 +9,7 @@ namespace metastable::dynamics {
 namespace {
 
 constexpr double taylor_share = 0.25;  // of the time sqrt(l/g) of the shorter of leg and swinging part
-constexpr double longest_share = 30;  // of sqrt(l/g), as of TwoLinkWalker
+constexpr double longest_share = 30;   // of sqrt(l/g), as of TwoLinkWalker
 
 double stance_inertia(const UnevenWalker& w) {
   const double l = w.stance.length(), a = w.stance.foot_to_mass;

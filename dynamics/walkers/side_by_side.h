@@ -1,0 +1,29 @@
+#pragma once
+// Walkers side by side: a number of each in vectors as wide as the processor has them. For sources that CMake's
+// metastable_vectorize() compiles; results have the same bits at any width.
+
+namespace metastable::dynamics {
+
+/// Hold a number of each of four or eight walkers.
+using Four = double __attribute__((vector_size(4 * sizeof(double))));
+using Eight = double __attribute__((vector_size(8 * sizeof(double))));
+
+/// Marks what works on vectors of eight numbers, and may be called only where has_eight_lanes().
+#ifdef METASTABLE_AVX2
+#define METASTABLE_EIGHT_LANES __attribute__((target("avx512f")))
+#else
+#define METASTABLE_EIGHT_LANES
+#endif
+
+/// Says whether the processor works on eight numbers at once. Put together from smaller vectors they are slower than
+/// four.
+inline bool has_eight_lanes() {
+#ifdef METASTABLE_AVX2
+  static const bool has = __builtin_cpu_supports("avx512f");
+  return has;
+#else
+  return false;
+#endif
+}
+
+}  // namespace metastable::dynamics
