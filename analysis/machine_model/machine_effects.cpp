@@ -17,8 +17,11 @@ constexpr double fine_step = 1e-4;        // of a range, for differences
 constexpr double widest_change = 0.5;     // of a nominal value, or
 constexpr double most_sds = 5;            //   of the sd with which it is known: how far a parameter may vary
 constexpr std::size_t fewest_trials = 5;  // whose spread is told
-constexpr int most_waves = 24;            // of a clock, at equal ratios
-constexpr int stretches = 6;              // of the way
+// Frequencies of a clock, so many periods of the record apart: a sine between two of them shows nine tenths of itself
+// in the nearer one. The last one has 64 periods in the record.
+constexpr int most_waves = 128;
+constexpr double waves_apart = 0.5;
+constexpr int stretches = 6;  // of the way
 constexpr double largest_memory = 0.9;
 // Zeros of sensors are known to a share of what a column spans, or to some of its errors.
 constexpr double usual_bias = 0.1, bias_errors = 3;
@@ -147,9 +150,10 @@ class Varying {
     one.candidate.variants.clear();
     const double whole = design_.last_time - design_.first_time, fastest = 2 * design_.usual_gap;
     if (design_.timed && whole > 2 * fastest) {
-      const double ratio = std::pow(whole / fastest, 1.0 / (most_waves - 1));
-      for (int i = 0; i < most_waves; ++i) one.candidate.variants.push_back({1 / (fastest * std::pow(ratio, i))});
-      one.candidate.refine = {0};
+      const double apart = waves_apart / whole;
+      for (int i = 0; i < most_waves && 1 / whole + i * apart <= 1 / fastest; ++i)
+        one.candidate.variants.push_back({1 / whole + i * apart});
+      one.candidate.refine = {apart};
     } else {
       one.candidate.variants = {{1.0}};
       one.candidate.undecidable = "the runs have no clock: a time_s for every row, by one clock for all trials";

@@ -32,6 +32,9 @@ constexpr UnitFactor unit_factors[]{
     {0.001, "thousands of the machine's unit", "thousands of the others' unit"}};
 constexpr double values_apart = 0.15, scatters_apart = 0.5;  // of logarithms; scatter is known roughly
 constexpr double same_share = 1e-6;                          // of the largest value of a state, asked for twice
+constexpr std::size_t most_asked = 256;                      // rows that are asked about anew
+constexpr double move_share = 0.05;                          // of an effect's range, or of a parameter's value
+constexpr double mixed_share = 0.1;                          // of what the move changes: solvers share their steps
 constexpr double trials_apart = 0.5;                         // of logarithms, of trials that start anywhere
 constexpr double trials_alike = 0.4;                         // of that factor's logarithm: spread of trials in one unit
 constexpr double launch_off = 4;                             // standard errors: one machine in 16000 by chance
@@ -327,20 +330,126 @@ std::vector<double> stepped(const Machine& machine, const NominalSteps& from, st
   return next;
 }
 
-// Refuses a map that makes something else of the same rows when it is asked again.
-void require_same_again(const Machine& machine, const NominalSteps& from) {
-  if (from.after.empty()) return;
-  const std::vector<double> once = stepped(machine, from, 0, 0), again = stepped(machine, from, 0, 0);
-  const std::size_t states = machine.states.size();
-  std::vector<double> largest(states, 0.0);
-  for (std::size_t i = 0; i < once.size(); ++i)
-    if (std::isfinite(once[i])) largest[i % states] = std::max(largest[i % states], std::abs(once[i]));
-  for (std::size_t i = 0; i < once.size(); ++i)
-    if (std::isfinite(once[i]) != std::isfinite(again[i]) ||
-        std::abs(once[i] - again[i]) > same_share * largest[i % states])
-      throw std::invalid_argument(
-          "step: it makes something else of the same states and noise when it is asked again; it must be a function of "
-          "its arguments alone, and take what it draws from the noise");
+// Asks the map about a few rows in several ways that must not matter.
+class AskedAnew {
+ public:
+  AskedAnew(const Machine& machine, const NominalSteps& from)
+      : machine_(machine),
+        states_(machine.states.size()),
+        scores_(static_cast<std::size_t>(machine.scores)),
+        rows_(std::min(from.after.size(), most_asked)) {
+    for (std::size_t i = 0; i < rows_ * states_; ++i) from_.push_back(from.states[i]);
+    for (std::size_t i = 0; i < rows_ * scores_; ++i) noise_.push_back(std::sin(1.7 * static_cast<double>(i + 1)));
+    for (const std::vector<double>& values : from.values)
+      nominal_.push_back(values.size() == 1 ? values : std::vector(values.begin(), values.begin() + at(rows_)));
+    moved_ = nominal_;
+    std::size_t v = 0;
+    for (const MachineParameter& p : machine.parameters) move(v++, p.sd > 0 ? p.sd : move_share * p.nominal, p.upper);
+    for (const MachineEffect& effect : machine.effects)
+      for (const SuspectedParameter& p : effect.parameters) move(v++, move_share * (p.upper - p.lower), p.upper);
+  }
+
+  // Returns what of the map hangs on more than its arguments; empty: nothing that was seen.
+  std::string fault() const {
+    if (rows_ == 0) return "";
+    const Values plain = asked(from_, noise_, nominal_);
+    if (!same(plain, asked(from_, noise_, nominal_)))
+      return "it makes something else of the same states and noise when it is asked again; it must be a function of "
+             "its "
+             "arguments alone, and take what it draws from the noise";
+    const Values turned = asked(reversed(from_, states_), reversed(noise_, scores_), reversed_values());
+    if (!same(plain, reversed(turned, states_)))
+      return "it makes something else of a row when the rows stand in another order; each row must be stepped by "
+             "itself, "
+             "with its own state, noise and parameters";
+    const Values moved = asked(from_, noise_, moved_), mixed = asked(from_, noise_, alternating());
+    for (std::size_t i = 0; i < plain.size(); ++i) {
+      const double right = i / states_ % 2 == 0 ? plain[i] : moved[i];
+      const double apart = std::abs(plain[i] - moved[i]);
+      if (std::isfinite(apart) && std::isfinite(mixed[i]) &&
+          std::abs(mixed[i] - right) > mixed_share * apart + same_share * std::abs(right))
+        return "it makes something else of a row when parameters are arrays of one number a row than with the same "
+               "numbers alone; each row must take its own";
+    }
+    return "";
+  }
+
+ private:
+  using Values = std::vector<double>;
+  using Columns = std::vector<Values>;
+
+  static std::ptrdiff_t at(std::size_t i) { return static_cast<std::ptrdiff_t>(i); }
+  void move(std::size_t value, double by, double upper) {
+    double& to = moved_[value][0];
+    to += to + by <= upper ? by : -by;
+  }
+  // Returns the next states, NaN where the machine failed.
+  Values asked(const Values& states, const Values& noise, const Columns& values) const {
+    Values next(states.size(), 0.0);
+    std::vector<std::uint8_t> failed(rows_);
+    const std::vector<std::span<const double>> spans(values.begin(), values.end());
+    machine_.step({rows_, states, noise, spans, next, failed});
+    for (std::size_t i = 0; i < next.size(); ++i)
+      if (failed[i / states_]) next[i] = std::numeric_limits<double>::quiet_NaN();
+    return next;
+  }
+  bool same(const Values& a, const Values& b) const {
+    Values largest(states_, 0.0);
+    for (std::size_t i = 0; i < a.size(); ++i)
+      if (std::isfinite(a[i])) largest[i % states_] = std::max(largest[i % states_], std::abs(a[i]));
+    for (std::size_t i = 0; i < a.size(); ++i)
+      if (std::isfinite(a[i]) != std::isfinite(b[i]) || std::abs(a[i] - b[i]) > same_share * largest[i % states_])
+        return false;
+    return true;
+  }
+  Values reversed(const Values& all, std::size_t width) const {
+    Values turned;
+    for (std::size_t i = rows_; i-- > 0;)
+      turned.insert(turned.end(), all.begin() + at(i * width), all.begin() + at((i + 1) * width));
+    return turned;
+  }
+  Columns reversed_values() const {
+    Columns turned;
+    for (const Values& values : nominal_) turned.push_back(values.size() == 1 ? values : reversed(values, 1));
+    return turned;
+  }
+  // Returns the nominal values in every other row, and the moved ones between.
+  Columns alternating() const {
+    Columns mixed;
+    for (std::size_t v = 0; v < nominal_.size(); ++v) {
+      const auto in = [&](const Values& values, std::size_t row) { return values[values.size() == 1 ? 0 : row]; };
+      mixed.emplace_back();
+      for (std::size_t i = 0; i < rows_; ++i) mixed.back().push_back(in(i % 2 == 0 ? nominal_[v] : moved_[v], i));
+    }
+    return mixed;
+  }
+
+  const Machine& machine_;
+  std::size_t states_, scores_, rows_;
+  Values from_, noise_;
+  Columns nominal_, moved_;
+};
+
+// Refuses a map that hangs on more than its arguments, row by row.
+void require_function(const Machine& machine, const NominalSteps& from) {
+  if (const std::string fault = AskedAnew(machine, from).fault(); !fault.empty())
+    throw std::invalid_argument("step: " + fault);
+}
+
+// Says which noise changes nothing, wherever the nominal machine is.
+std::vector<std::string> idle_noise(const Machine& machine, const NominalSteps& from) {
+  std::vector<std::string> said;
+  if (from.after.empty()) return said;
+  for (std::size_t m = 0; m < static_cast<std::size_t>(machine.scores); ++m) {
+    const std::vector<double> up = stepped(machine, from, m, 1), down = stepped(machine, from, m, -1);
+    bool idle = true;
+    for (std::size_t i = 0; i < up.size() && idle; ++i)
+      idle = up[i] == down[i] || (std::isnan(up[i]) && std::isnan(down[i]));
+    if (idle)
+      said.push_back(
+          fmt::format("step: number {} of the noise changes nothing at the nominal parameters: is it used?", m + 1));
+  }
+  return said;
 }
 
 // Puts the measured next values beside those of the nominal map, and what lies between beside its noise, and asks
@@ -452,7 +561,8 @@ std::vector<std::string> look_over(const Machine& machine, const MachineRuns& ru
   }
   require_launch(machine, runs);
   const NominalSteps from = nominal_steps(machine, runs);
-  require_same_again(machine, from);
+  require_function(machine, from);
+  for (std::string& sentence : idle_noise(machine, from)) said.push_back(std::move(sentence));
   for (std::string& sentence : doubled_trials(runs)) said.push_back(std::move(sentence));
   for (std::string& sentence : other_units(machine, from)) said.push_back(std::move(sentence));
   for (std::string& sentence : odd_trials(machine, runs)) said.push_back(std::move(sentence));

@@ -314,9 +314,8 @@ CoupledPassage coupled_passage(const Mesh& mesh, std::span<const double> start, 
     last = steps;
   }
   const std::vector<double> lower = aggregation.solve(start_by_class, true);
-  passage.steps_upper = last;
+  passage.steps = last;
   passage.steps_lower = std::accumulate(lower.begin(), lower.end(), 0.0);
-  passage.steps = std::sqrt(passage.steps_upper * passage.steps_lower);
   passage.failure_rate = last_rate(mesh, aggregation, y, passage.products);
   found.share.assign(classes.gaits, 0.0);
   for (std::size_t i = 0; i < y.size(); ++i) found.share[classes.gait[classes.of_node[i]]] += y[i] / last;

@@ -101,7 +101,7 @@ MeshPassage follow_survivors(const MassRows& rows, std::vector<double> x, double
     passage.products += static_cast<int>(turn.survival.size());
     for (const double share : turn.survival) passage.survival.push_back(alive * share);
     if (turn.extinct) {
-      passage.steps = passage.steps_upper = passage.steps + alive * turn.steps;
+      passage.steps += alive * turn.steps;
       passage.steps_lower = steps_lower + alive_lower * turn.steps_lower;
       passage.failure_rate = 1;
       visit(alive);
@@ -118,9 +118,8 @@ MeshPassage follow_survivors(const MassRows& rows, std::vector<double> x, double
     }
     last_failures = turn.failures;
     if (settled == in_a_row) {
-      passage.steps_upper = passage.steps + alive * turn.steps / turn.failures;
+      passage.steps += alive * turn.steps / turn.failures;
       passage.steps_lower = steps_lower + alive_lower * turn.steps_lower / turn.failures_lower;
-      passage.steps = std::sqrt(passage.steps_upper * passage.steps_lower);
       passage.failure_rate = rows.phases == 1 ? turn.failures : -std::expm1(std::log1p(-turn.failures) / rows.phases);
       passage.distribution = std::move(turn.distribution);
       visit(alive / turn.failures);

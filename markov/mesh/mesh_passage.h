@@ -10,9 +10,10 @@
 namespace metastable::markov {
 
 struct MeshPassage {
-  double steps = 0;                  ///< expected steps before failure from the start, the failing one included
+  /// Expected steps before failure from the start, the failing one included: what leaves the mesh goes on as the others
+  /// do, which is too long where it is likelier to fail.
+  double steps = 0;
   double steps_lower = 0;            ///< if what leaves the mesh failed at once
-  double steps_upper = 0;            ///< if it went on as the others do
   double failure_rate = 0;           ///< a step, once settled: distribution . kill (for phases: of the mean step)
   double mixing_steps = 0;           ///< e-folding of the distance from the quasi-stationary distribution
   std::vector<double> survival;      ///< survival[k]: share that survives step k + 1, until settled; then geometric

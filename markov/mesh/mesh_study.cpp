@@ -36,9 +36,9 @@ constexpr std::size_t enough_trials =
 constexpr double widest = 4;        // of the interval: its end over its beginning, beyond which it is no answer
 constexpr double most_blind = 0.1;  // of the failures, in blind spots: beyond, bands are stepped over
 constexpr double row_error = 5e-4;  // what reading rows off curves may leave, about so much
-constexpr std::size_t fewest_shifts = 3;
-constexpr double narrow = 0.01;  // half-width of what a few shifts may say: the parts of a wider one are told by many
-constexpr std::size_t most_trials = 10000000;  // they leave 0.03 % of the steps, and take 80 MB
+constexpr double narrow = 0.01;  // half-width, up to which shifts may scatter as much as what else the interval holds
+constexpr double little_scatter = 0.5;  // the share of that in a wider one: what it holds is told by many, else
+constexpr std::size_t fewest_shifts = 3, most_trials = 10000000;  // so many trials leave 0.03 % of the steps
 // A simulation of fewer trials than this is replaced by walks that do not end at a failure, with half of the steps that
 // the trials would have: an eighth of a quick study's time.
 constexpr double least_counted_share = 0.5;
@@ -53,7 +53,7 @@ constexpr double longest_trial_factor = 30;  // times the expected steps: one tr
 
 /// Returns the coarsest spacings that the extrapolation was found to bear, by dimension.
 double coarsest(int dimension) {
-  constexpr std::array<double, 4> spacing{0.4, 0.5, 0.7, 1.0};
+  constexpr std::array<double, 4> spacing{0.32, 0.5, 0.7, 1.0};
   return spacing[static_cast<std::size_t>(dimension - 1)];
 }
 
@@ -63,8 +63,10 @@ double coarsest_spacing(const BatchMap& map, const MeshStudyOptions& options) {
 
 double half_width(const MeshEstimate& e) { return 0.5 * std::log(e.upper / e.lower); }
 
-MeshEstimate around(double value, double relative) {
-  return {value, value * std::exp(-relative), value * std::exp(relative)};
+MeshEstimate around(const Extrapolated& logarithm) {
+  const double value = std::exp(logarithm.value);
+  const double factor = std::exp(std::hypot(logarithm.shift_error, logarithm.discretization_error));
+  return {value, value / factor, value * factor};
 }
 
 /// Returns the simulations of a study: of about `simulated_steps` steps.
@@ -295,7 +297,7 @@ class Run {
     MeshPassage& passage = coupled.passage;
     steps_[shift][size] = std::log(passage.steps);
     rates_[shift][size] = std::log(passage.failure_rate);
-    brackets_[shift][size] = 0.5 * std::log(passage.steps_upper / passage.steps_lower);
+    brackets_[shift][size] = std::log(passage.steps / passage.steps_lower);
     if (size == 0 && shift == 0) {
       coarsest_.seconds += work_.seconds() - before;
       study_.blind_spots = find_blind_spots(map_, frames_, mesh, passage.visits, mesh_options(0, 0));
@@ -328,19 +330,20 @@ class Run {
   }
 
   void list_sizes() {
-    for (std::size_t size = 0; size < sizes_; ++size)
-      for (std::size_t shift = 0; shift < shifts_; ++shift)
+    for (std::size_t shift = 0; shift < shifts_; ++shift)
+      for (std::size_t size = 0; size < sizes_; ++size)
         study_.sizes[size].steps.push_back(std::exp(steps_[shift][size]));
   }
 
   /// Returns whether further shifts would hardly narrow the intervals.
-  bool settled() const { return shifts_ > 0 && shifts_scatter_ <= 1 && half_width(study_.steps) <= narrow; }
+  bool settled() const {
+    return shifts_ > 0 && shifts_scatter_ <= (half_width(study_.steps) <= narrow ? 1 : little_scatter);
+  }
 
   /// Joins the shifts made so far.
   void join() {
-    for (std::size_t size = 0; size < sizes_; ++size)
-      for (std::size_t shift = 0; shift < shifts_; ++shift)
-        study_.bracket = std::max(study_.bracket, brackets_[shift][size]);
+    for (std::size_t shift = 0; shift < shifts_; ++shift)
+      study_.bracket = std::max(study_.bracket, std::ranges::max(brackets_[shift]));
     // What an extrapolation says of its own error grows with what it left out: as the square of the spacing.
     const double coarser = std::max(1.0, study_.sizes.front().spacing / coarsest(map_.dimension));
     const auto extrapolated = [&](const std::vector<std::vector<double>>& logs) {
@@ -351,12 +354,11 @@ class Run {
     const Extrapolated by_steps = extrapolated(steps_), by_rate = extrapolated(rates_);
     shifts_scatter_ = std::max(by_steps.shift_error / (by_steps.discretization_error + study_.bracket),
                                by_rate.shift_error / (by_rate.discretization_error + study_.bracket));
-    study_.shift_error = by_steps.shift_error;
-    study_.discretization_error = by_steps.discretization_error;
-    study_.steps = around(std::exp(by_steps.value),
-                          std::hypot(by_steps.shift_error, by_steps.discretization_error) + study_.bracket);
-    study_.failure_rate =
-        around(std::exp(by_rate.value), std::hypot(by_rate.shift_error, by_rate.discretization_error) + study_.bracket);
+    study_.shift_error = by_steps.shift_error, study_.discretization_error = by_steps.discretization_error;
+    study_.steps = around(by_steps);
+    study_.steps.lower *= std::exp(-study_.bracket);
+    study_.failure_rate = around(by_rate);
+    study_.failure_rate.upper *= std::exp(study_.bracket);
   }
 
   /// Widens the intervals by what the mesh may not have seen, or says that it is too much.
@@ -466,16 +468,14 @@ class Run {
     GuidedRate guided;
     double even = 0;
     int window = reaching_window(*guide_, guide_settled_, std::min(forgets, longest_window));
-    {
+    const auto foresee = [&] {
       const std::lock_guard lock(mutex_);
-      work_.replan(guided_stage, guided_rows(forgets, window, study_.failure_rate.value));
-    }
+      const double rows = guided_rows(forgets, window, study_.failure_rate.value);
+      guided.samples > 0 ? work_.add(guided_stage, rows) : work_.replan(guided_stage, rows);
+    };
     for (; even < least_even_share; window = std::min(2 * window, longest_window)) {
       if (study_.steps.value <= sampled_windows * window) break;
-      if (guided.samples > 0) {
-        const std::lock_guard lock(mutex_);
-        work_.add(guided_stage, guided_rows(forgets, window, study_.failure_rate.value));
-      }
+      foresee();
       guided = guided_failure_rate(turns, *guide_, start_,
                                    {.samples = options_.guided_samples,
                                     .burn_in = std::min(2 * forgets, 60000),

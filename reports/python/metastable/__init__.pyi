@@ -339,6 +339,7 @@ class Machine:
 class Runs:
     trials: int
     rows: int
+    lost: int
 
 
 class Walker:

@@ -1,5 +1,6 @@
 """Machines of your own: a simulator with names, and the logs of the real one."""
 
+import datetime
 import math
 import numbers
 import os
@@ -119,24 +120,57 @@ def _column(data, name):
                         f"{type(data).__name__}") from None
 
 
-def _floats(values, name, rows):
-    if numpy.ma.isMaskedArray(values):
-        raise TypeError(f"{name}: a masked array is given: fill what is missing with NaN")
-    try:
-        array = numpy.asarray(values, float)
-    except (TypeError, ValueError):
-        raise TypeError(f"{name}: an array of numbers expected") from None
+def _missing(one):
+    """None, NaN, NaT, or the missing value of pandas, which can be compared with nothing."""
+    if one is None or type(one).__name__ in ("NAType", "NaTType"):
+        return True
+    return isinstance(one, (numbers.Real, numpy.datetime64, numpy.timedelta64)) and bool(one != one)
+
+
+def _one_a_row(values, name, rows, kind=None):
+    array = numpy.asarray(values, kind)
     if array.ndim != 1 or len(array) != rows:
         raise InputError(f"{name}: shape {array.shape} given, ({rows},) expected: one value a row")
     return array
 
 
+def _floats(values, name, rows):
+    """Numbers of a column; NaN where one is missing."""
+    if numpy.ma.isMaskedArray(values):
+        raise TypeError(f"{name}: a masked array is given: fill what is missing with NaN")
+    array = _one_a_row(values, name, rows)
+    if array.dtype.kind in "mMc":  # numpy would count nanoseconds, or drop the imaginary part
+        raise TypeError(f"{name}: an array of numbers expected, not of {array.dtype}")
+    if array.dtype == object:
+        array = numpy.array([math.nan if _missing(one) else one for one in array], object)
+    try:
+        return array.astype(float)
+    except (TypeError, ValueError):
+        raise TypeError(f"{name}: an array of numbers expected") from None
+
+
+def _seconds(values, name, rows):
+    """Times in seconds: numbers as they are, durations in seconds, dates in seconds since the first of them."""
+    array = _one_a_row(values, name, rows)
+    known = [one for one in array if not _missing(one)] if array.dtype.kind in "OmM" else []
+    if known and isinstance(known[0], (datetime.date, numpy.datetime64)):
+        first = known[0]
+    elif known and isinstance(known[0], (datetime.timedelta, numpy.timedelta64)):
+        first = None
+    else:
+        return _floats(values, name, rows)
+    second = datetime.timedelta(seconds=1) if array.dtype == object else numpy.timedelta64(1, "s")
+    try:
+        return numpy.array([math.nan if _missing(one) else (one if first is None else one - first) / second
+                            for one in array], float)
+    except (TypeError, ValueError):
+        raise TypeError(f"{name}: seconds are expected, as numbers, as durations or as dates of one kind") from None
+
+
 def _ranked(values, name, rows):
     """Indices of the values among those there are, in order, and their names; missing ones are -1."""
-    array = numpy.asarray(values, object)
-    if array.ndim != 1 or len(array) != rows:
-        raise InputError(f"{name}: shape {array.shape} given, ({rows},) expected: one value a row")
-    missing = numpy.array([one is None or (isinstance(one, numbers.Real) and math.isnan(one)) for one in array], bool)
+    array = _one_a_row(values, name, rows, object)
+    missing = numpy.array([_missing(one) for one in array], bool)
     known = list(array[~missing])
     try:
         kinds = sorted(set(known))
@@ -147,40 +181,187 @@ def _ranked(values, name, rows):
             [str(one.item() if hasattr(one, "item") else one) for one in kinds])
 
 
+def _require_no_mark(values, name, index):
+    """Refuses a value that stands for missing ones: it is there again and again, far from all others. Rows between the
+    first and the last of a trial count: trials may all begin, or end at a stop, far from where they go. Nor is 0 a
+    mark, as machines do stand still."""
+    if not len(index):
+        return
+    turns = index[1:] != index[:-1]
+    between = ~(numpy.concatenate([[True], turns]) | numpy.concatenate([turns, [True]]))
+    found, counts = numpy.unique(values[between & numpy.isfinite(values)], return_counts=True)
+    for one in found[(counts >= 3) & (found != 0)]:
+        others = values[numpy.isfinite(values) & (values != one)]
+        count = int((values == one).sum())
+        if not len(others) or count < 0.01 * len(values):
+            continue
+        low, high = numpy.percentile(others, [25, 75])
+        scale = high - low if high > low else others.max() - others.min()
+        if scale > 0 and numpy.abs(others - one).min() > 20 * scale:
+            raise InputError(f"{name} is {one:g} in {count} of {len(values)} rows, far from all "
+                             "other values: is it a mark for missing values? Give NaN there (in a file: no value)")
+
+
+class _LostRows:
+    """The rows that a column step tells to be missing, put in: nothing was measured in them."""
+
+    def __init__(self, step, index, names):
+        self.index, self.names = index, names
+        self.steps = _floats(step, "step", len(index))
+        self.first = numpy.searchsorted(index, numpy.arange(len(names)))
+        whole = numpy.isfinite(self.steps) & (self.steps == numpy.round(self.steps))
+        if not whole.all():
+            at = int(whole.argmin())
+            raise InputError(f"step: it is {self.steps[at]:g} in {self._where(at)}: a whole number is expected, the "
+                             "step's in its trial")
+        same = index[1:] == index[:-1]
+        ahead = numpy.where(same, numpy.diff(self.steps), 1)
+        if (ahead < 1).any():
+            at = int((ahead < 1).argmax()) + 1
+            raise InputError(f"step: it is {self.steps[at]:.15g} in {self._where(at)}, after {self.steps[at - 1]:.15g} "
+                             "in the row before: steps are expected to rise within a trial")
+        self._require_few(ahead)
+        self.goes_on = numpy.append(same, False)[:len(index)]  # the trial has another row
+        self.after = numpy.append(ahead, 1)[:len(index)].astype(int) - 1  # lost ones, by the row before
+        self.source = numpy.repeat(numpy.arange(len(index)), 1 + self.after)
+        self.place = numpy.arange(len(index)) + numpy.cumsum(self.after) - self.after  # of the rows given
+        self.ahead = numpy.arange(len(self.source)) - self.place[self.source]  # 0: given
+        self.lost = self.ahead > 0
+
+    def _require_few(self, ahead):
+        rows, longest = len(self.index), numpy.bincount(self.index, minlength=1).max()
+        if not rows or (numpy.max(ahead, initial=1) - 1 <= 10 * longest and (ahead - 1).sum() <= 10 * rows):
+            return
+        at = int(ahead.argmax()) + 1
+        raise InputError(f"step: it is {self.steps[at]:.15g} in {self._where(at)}, after {self.steps[at - 1]:.15g} "
+                         f"in the row before, so that {(ahead - 1).sum():.15g} rows are missing beside the {rows} "
+                         "there are: a step number is wrong, or step numbers something else")
+
+    def _where(self, at):
+        return f"trial {self.names[self.index[at]]}, row {at - self.first[self.index[at]] + 1}"
+
+    def nothing(self, values):
+        """Measured values, [rows x columns]."""
+        return numpy.where(self.lost[:, None], math.nan, values[self.source])
+
+    def evenly(self, values):
+        """A clock or a place, which goes on evenly from the row before to the row after."""
+        change = numpy.append(values[1:], math.nan)[:len(values)] - values
+        return numpy.where(self.lost, values[self.source] + change[self.source] * self.ahead /
+                           (1 + self.after[self.source]), values[self.source])
+
+    def held(self, values, name):
+        """An input, which a step needs: known where it is the same for all steps of its trial."""
+        for row in numpy.flatnonzero(self.after):
+            begin, end = numpy.searchsorted(self.index, [self.index[row], self.index[row] + 1])
+            if (values[begin:end - 1] != values[row]).any():  # the last row has no step
+                self._refuse(row, 1, f"inputs: {name}", name)
+        return values[self.source]
+
+    def going_on(self, values, name, stays):
+        """Indices of words: what was seen to follow what leads one way only from the row before to the row after.
+        @param stays  what never changes within a trial goes on, though no row was seen to follow another"""
+        kept = values[self.source]
+        changes = numpy.append(values[1:] != values[:-1], False)[:len(values)]
+        if not self.after.any() or (stays and not changes[self.goes_on].any()):
+            return kept
+        onward, back = {}, {}
+        for one, other in {(values[at], values[at + 1]) for at in numpy.flatnonzero(self.goes_on & (self.after == 0))}:
+            if min(one, other) >= 0:
+                onward.setdefault(one, set()).add(other)
+                back.setdefault(other, set()).add(one)
+        for row in numpy.flatnonzero(self.after):
+            at, count = self.place[row], self.after[row]
+            if min(values[row], values[row + 1]) < 0:
+                kept[at + 1:at + 1 + count] = -1
+                continue
+            reached, leading = [{values[row]}], [{values[row + 1]}]
+            for _ in range(count):
+                reached.append(set().union(*(onward.get(one, ()) for one in reached[-1])))
+                leading.append(set().union(*(back.get(one, ()) for one in leading[-1])))
+            for k in range(1, count + 1):
+                possible = reached[k] & leading[count + 1 - k]
+                if len(possible) != 1:
+                    self._refuse(row, k, f"{name}: its value", f"{name} (None: not known)")
+                kept[at + k], = possible
+        return kept
+
+    def _refuse(self, row, ahead, subject, wanted):
+        raise InputError(f"{subject} in the lost step {self.steps[row] + ahead:.15g} of trial "
+                         f"{self.names[self.index[row]]} does not follow from the other rows: put the row in, with its "
+                         f"{wanted}, and NaN for what was measured")
+
+
 class Runs:
     """Rows of the real machine; see runs()."""
 
     def __init__(self, machine, data, columns, outcome, labels, inputs):
+        self._require_known(machine, columns)
+
         def find(name):
             given = columns.get(name)
             return given if given is not None else _column(data, name)
 
-        unknown = set(columns) - {"trial", "condition", "phase", "time_s", "position_m", *machine.sensor}
-        if unknown:
-            name = sorted(unknown)[0]
-            where = f": an input is given in inputs={{'{name}': ...}}" if name in machine.inputs else \
-                f"; a label is given in labels={{'{name}': ...}}"
-            raise InputError(f"runs: \"{name}\" is none of the columns trial, condition, phase, time_s, "
-                             f"position_m, {', '.join(machine.sensor)}{where}")
         trial = find("trial")
         if trial is None:
             raise InputError("runs: there is no column trial")
-        rows = len(trial)
-        condition, conditions = ((numpy.zeros(rows, int), ["all"]) if find("condition") is None
-                                 else _ranked(find("condition"), "condition", rows))
+        self.rows = rows = len(trial)
+        trial = _one_a_row(trial, "trial", rows)
+        by_condition = find("condition") if find("condition") is not None else numpy.full(rows, "all")
+        condition, conditions = _ranked(by_condition, "condition", rows)
         if rows and condition.min() < 0:
             raise InputError(f"condition: row {int(condition.argmin()) + 1} has none")
         index = self._in_order(trial, condition, rows)
         self.trials = int(index.max()) + 1 if rows else 0
+        first = numpy.searchsorted(index, numpy.arange(self.trials))
+        names = self._names(trial[first], condition[first], conditions)
+        seen = self._measured(machine, find, index)
+        phase, phases = (numpy.full(rows, -1), []) if find("phase") is None else _ranked(find("phase"), "phase", rows)
+        label_index, label_values = self._labels(data, labels, rows)
+        given_inputs = self._inputs(machine, data, inputs, rows)
+        time, position = (numpy.full(rows, math.nan) if find(name) is None else read(find(name), name, rows)
+                          for name, read in (("time_s", _seconds), ("position_m", _floats)))
+        other = "step" in machine.states or "step" not in columns and "step" in (*machine.inputs, *label_values)
+        step = None if other else find("step")  # a column of this name that means something else numbers no rows
+        lost = _LostRows(numpy.arange(rows) if step is None else step, index, names)
+        self.lost = int(lost.lost.sum())
+        self._columns = tuple(machine.sensor), machine.inputs
+
+        def stacked(all_columns, kind):
+            return numpy.column_stack(all_columns) if all_columns else numpy.zeros((len(lost.source), 0), kind)
+
+        self._laid_out = dict(
+            trial=index[lost.source], trial_names=names, seen=lost.nothing(seen), time=lost.evenly(time),
+            position=lost.evenly(position), phase=lost.going_on(phase, "phase", len(phases) < 2), phases=phases,
+            conditions=conditions, trial_condition=condition[first], labels=label_values,
+            label_index=stacked([lost.going_on(one, name, True) for one, name in zip(label_index, label_values)], int),
+            input_values=stacked([lost.held(one, name) for one, name in zip(given_inputs, machine.inputs)], float),
+            outcome=_outcomes(find("outcome") if outcome is None else outcome, trial[first],
+                              numpy.asarray(by_condition, object)[first], conditions, rows))
+
+    @staticmethod
+    def _require_known(machine, columns):
+        unknown = set(columns) - {"trial", "step", "condition", "phase", "time_s", "position_m", *machine.sensor}
+        if unknown:
+            name = sorted(unknown)[0]
+            where = f": an input is given in inputs={{'{name}': ...}}" if name in machine.inputs else \
+                f"; a label is given in labels={{'{name}': ...}}"
+            raise InputError(f"runs: \"{name}\" is none of the columns trial, step, condition, phase, time_s, "
+                             f"position_m, {', '.join(machine.sensor)}{where}")
+
+    @staticmethod
+    def _measured(machine, find, index):
         seen = []
         for state in machine.sensor:
             values = find(state)
             if values is None:
                 raise InputError(f"runs: there is no column {state}, which the machine's sensor measures")
-            seen.append(_floats(values, state, rows))
-        optional = {name: numpy.full(rows, math.nan) if find(name) is None else _floats(find(name), name, rows)
-                    for name in ("time_s", "position_m")}
-        phase, phases = (numpy.full(rows, -1), []) if find("phase") is None else _ranked(find("phase"), "phase", rows)
+            seen.append(_floats(values, state, len(index)))
+            _require_no_mark(seen[-1], state, index)
+        return numpy.column_stack(seen) if len(index) else numpy.zeros((0, len(seen)))
+
+    @staticmethod
+    def _labels(data, labels, rows):
         label_index, label_values = [], {}
         for name in _words(labels if not isinstance(labels, dict) else labels.keys(), "labels"):
             if name in label_values:
@@ -190,24 +371,18 @@ class Runs:
                 raise InputError(f"labels: there is no column {name}")
             at, label_values[name] = _ranked(values, name, rows)
             label_index.append(at)
-        given_inputs = []
+        return label_index, label_values
+
+    @staticmethod
+    def _inputs(machine, data, inputs, rows):
+        given = []
         for name in machine.inputs:
             values = dict(inputs).get(name) if inputs else None
             values = values if values is not None else _column(data, name)
             if values is None:
                 raise InputError(f"inputs: there is no column {name}, which the machine's step takes")
-            given_inputs.append(_floats(values, name, rows))
-        first = numpy.array([numpy.argmax(index == t) for t in range(self.trials)], int)
-        self.rows = rows
-        self._columns = tuple(machine.sensor), machine.inputs
-        self._laid_out = dict(
-            trial=index, trial_names=self._names(numpy.asarray(trial)[first], condition[first], conditions) if rows else [],
-            seen=numpy.column_stack(seen) if rows else numpy.zeros((0, len(seen))),
-            time=optional["time_s"], position=optional["position_m"], phase=phase, phases=phases,
-            conditions=conditions, trial_condition=condition[first] if rows else numpy.zeros(0, int), labels=label_values,
-            label_index=numpy.column_stack(label_index) if label_index else numpy.zeros((rows, 0), int),
-            input_values=numpy.column_stack(given_inputs) if given_inputs else numpy.zeros((rows, 0)),
-            outcome=self._outcomes(find("outcome") if outcome is None else outcome, numpy.asarray(trial)[first] if rows else []))
+            given.append(_floats(values, name, rows))
+        return given
 
     @staticmethod
     def _in_order(trial, condition, rows):
@@ -215,8 +390,8 @@ class Runs:
         together."""
         seen, index = {}, numpy.zeros(rows, int)
         before = None
-        for at, key in enumerate(zip(condition.tolist(), numpy.asarray(trial).tolist())):
-            if key[1] is None or key[1] != key[1]:
+        for at, key in enumerate(zip(condition.tolist(), trial.tolist())):
+            if _missing(key[1]):
                 raise InputError(f"trial: row {at + 1} has none")
             if key != before and key in seen:
                 raise InputError(f"trial: the rows of trial {key[1]} do not stand together: rows come in the order they "
@@ -230,23 +405,69 @@ class Runs:
         """What messages call the trials: as their user does, with the condition where there are several."""
         return [f"{name} of {conditions[at]}" if len(conditions) > 1 else str(name) for name, at in zip(trial, condition)]
 
-    def _outcomes(self, outcome, names):
-        if outcome is None:
-            return [None] * self.trials
-        if isinstance(outcome, dict):
-            known = [name.item() if hasattr(name, "item") else name for name in names]
-            unknown = [key for key in outcome if key not in known]
-            if unknown:
-                raise InputError(f"outcome: {unknown[0]!r} is no trial")
-            outcome = [outcome.get(name) for name in known]
-        values = [None if one is None or one != one else str(one) for one in
-                  (outcome.tolist() if hasattr(outcome, "tolist") else list(outcome))]
-        if len(values) == self.trials:
-            return values
-        raise InputError(f"outcome: {len(values)} given, one for each of the {self.trials} trials expected")
-
     def __repr__(self):
-        return f"<metastable.Runs: {self.trials} trials, {self.rows} rows>"
+        lost = f" and {self.lost} lost ones between them" if self.lost else ""
+        return f"<metastable.Runs: {self.trials} trials, {self.rows} rows{lost}>"
+
+
+def _outcomes(outcome, trials, conditions, condition_names, rows):
+    """The outcomes in the order of the trials; None where one is not known."""
+    if outcome is None:
+        return [None] * len(trials)
+    if isinstance(outcome, str):
+        raise InputError(f"outcome: one for each of the {len(trials)} trials expected, not one word")
+    if getattr(outcome, "ndim", 1) != 1:
+        raise InputError("outcome: one for each trial expected, not a table")
+    series = hasattr(outcome, "items") and hasattr(outcome, "index") and not callable(outcome.index)
+    values = outcome.tolist() if hasattr(outcome, "tolist") else list(outcome)
+    if series and not (len(values) == rows != len(trials)):  # a column of all rows is refused below
+        values = _outcomes_of_series(outcome, trials, conditions, condition_names)
+    elif hasattr(outcome, "items") and not series:
+        values = _outcomes_by_trial(outcome.items(), trials, conditions, condition_names)
+    if len(values) != len(trials):
+        raise InputError(f"outcome: {len(values)} given, one for each of the {len(trials)} trials expected")
+    return [None if _missing(one) else str(one) for one in values]
+
+
+def _outcomes_of_series(series, trials, conditions, condition_names):
+    """Those of a pandas.Series: by its index, or in their order where the index only counts them."""
+    in_order, index = series.tolist(), list(series.index)
+    if type(series.index).__name__ != "RangeIndex" or len(index) != len(trials) or index != list(range(len(index))):
+        return _outcomes_by_trial(series.items(), trials, conditions, condition_names)
+    if set(index) != set(trials.tolist()):
+        return in_order
+    by_trial = _outcomes_by_trial(series.items(), trials, conditions, condition_names)
+    if any(one is not other and (_missing(one) or _missing(other) or one != other)
+           for one, other in zip(in_order, by_trial)):
+        raise InputError("outcome: the index of the Series counts from 0, and so do the trials, which come in another "
+                         "order: give a dict by trial, or a list in the order of the trials")
+    return in_order
+
+
+def _outcomes_by_trial(items, trials, conditions, condition_names):
+    """Those of keys that are trials, or (condition, trial) where several conditions have such a trial."""
+    def plain(one):
+        return one.item() if hasattr(one, "item") else one
+
+    places = {}
+    for at, (condition, trial) in enumerate(zip(map(plain, conditions), map(plain, trials))):
+        places.setdefault(trial, []).append(at)
+        places[condition, trial] = [at]
+    found = {}
+    for key, value in items:
+        try:
+            at = places[key]
+        except (KeyError, TypeError):
+            among = ", nor a (condition, trial)" if len(condition_names) > 1 else ""
+            raise InputError(f"outcome: {key!r} is no trial{among}") from None
+        if len(at) > 1:
+            known = [plain(conditions[one]) for one in at]
+            raise InputError(f"outcome: trial {key!r} is there in the conditions {', '.join(map(str, known))}: give "
+                             f"(condition, trial), as ({known[0]!r}, {key!r})")
+        if at[0] in found:
+            raise InputError(f"outcome: {key!r} is there twice")
+        found[at[0]] = value
+    return [found.get(at) for at in range(len(trials))]
 
 
 def machine(step, *, states, noise, parameters, effects={}, may_vary=(), sensor=None, launch={}, inputs=(), most_wild=0.01,
@@ -280,14 +501,21 @@ def machine(step, *, states, noise, parameters, effects={}, may_vary=(), sensor=
 def runs(machine, data=None, *, outcome=None, labels=(), inputs=None, **columns):
     """Runs of the real machine: one row for each state, in the order in which they were taken, trial by trial.
 
+    Raises ValueError or TypeError with a sentence where they cannot be: so where a measured value that is far from all
+    others stands in row after row, as -999 does for missing values.
+
     machine   of machine()
     data      anything with columns, a pandas.DataFrame or a dict of arrays: columns are looked for there where they are
               not given by name; or an experiment folder whose experiment.toml states model = "none"
-    columns   trial, and every state that the machine's sensor measures (NaN: missing); optionally condition, phase (which
-              leg, which half of the cycle: it belongs to the step that starts from the row), time_s by one clock for all
-              trials, position_m
-    outcome   trial -> "failed", "stopped" or "lost", as a dict or in the order of the trials; "failed": the machine failed
-              in the step after the trial's last row
+    columns   trial, and every state that the machine's sensor measures (NaN: missing); optionally step, condition,
+              phase (which leg, which half of the cycle: it belongs to the step that starts from the row), time_s by one
+              clock for all trials (durations and dates become seconds), position_m. step numbers the rows of a trial,
+              from any whole number on; where some are left out, rows in which nothing was measured are put in. Time
+              and place go on evenly in them, phases and labels as they are seen to follow each other, inputs that are
+              the same all through the trial; what does not follow is refused
+    outcome   "failed", "stopped" or "lost" by trial, as a dict or a pandas.Series whose keys are the trials, or
+              (condition, trial) where each condition numbers its trials anew; or a list in the order of the trials.
+              "failed": the machine failed in the step after the trial's last row
     labels    names of columns of labels (a crew, a floor), or a dict of them
     inputs    a dict of the machine's inputs, where they are not in data
     """

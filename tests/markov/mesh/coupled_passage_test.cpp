@@ -31,7 +31,7 @@ TEST(CoupledPassage, IsWhatEliminationSaysOfItsChain) {
     double steps = 0;
     for (int c = 0; c < corners.count; ++c)
       steps += corners.weight[static_cast<std::size_t>(c)] * mean[corners.node[static_cast<std::size_t>(c)]];
-    const double bracket = coupled.passage.steps_upper / coupled.passage.steps_lower - 1;  // of what leaves the mesh
+    const double bracket = coupled.passage.steps / coupled.passage.steps_lower - 1;  // of what leaves the mesh
     EXPECT_LT(bracket, 1e-3) << gaits.sd;
     EXPECT_NEAR(coupled.passage.steps_lower / steps, 1, 1e-6 + bracket) << gaits.sd;
     EXPECT_NEAR(coupled.share[0] + coupled.share[1], 1, 1e-6);
@@ -60,7 +60,7 @@ TEST(CoupledPassage, TurnsOfOneGaitAreOne) {
     double steps = 0;
     for (int c = 0; c < corners.count; ++c)
       steps += corners.weight[static_cast<std::size_t>(c)] * mean[corners.node[static_cast<std::size_t>(c)]];
-    const double bracket = coupled.passage.steps_upper / coupled.passage.steps_lower - 1;
+    const double bracket = coupled.passage.steps / coupled.passage.steps_lower - 1;
     EXPECT_LT(bracket, 1e-3) << sd;
     EXPECT_NEAR(coupled.passage.steps_lower / steps, 1, 1e-6 + bracket) << sd;
     EXPECT_NEAR(coupled.passage.failure_rate / quasi_stationary(solver).failure_rate, 1, 1e-6 + 3 * bracket) << sd;
