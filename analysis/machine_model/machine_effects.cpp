@@ -18,8 +18,8 @@ constexpr double widest_change = 0.5;     // of a nominal value, or
 constexpr double most_sds = 5;            //   of the sd with which it is known: how far a parameter may vary
 constexpr std::size_t fewest_trials = 5;  // whose spread is told
 // Frequencies of a clock, so many periods of the record apart: a sine between two of them shows nine tenths of itself
-// in the nearer one. The last one has 64 periods in the record.
-constexpr int most_waves = 128;
+// in the nearer one. All parameters that may vary share so many: of one they reach to 256 periods in the record.
+constexpr std::size_t most_waves = 512, fewest_waves = 128;
 constexpr double waves_apart = 0.5;
 constexpr int stretches = 6;  // of the way
 constexpr double largest_memory = 0.9;
@@ -78,7 +78,8 @@ class Varying {
         range_(range_of(parameter)) {}
 
   std::vector<MachineCandidate> all(const Machine& machine) const {
-    std::vector<MachineCandidate> list{by_phase(), drift(), spread(), clock(), stretch()};
+    const std::size_t waves = std::max(fewest_waves, most_waves / machine.may_vary.size());
+    std::vector<MachineCandidate> list{by_phase(), drift(), spread(), clock(waves), stretch()};
     for (std::size_t j = 0; j < machine.observe.size(); ++j) list.push_back(with_state(machine, j));
     for (std::size_t l = 0; l < design_.labels.size(); ++l) list.push_back(by_label(l));
     return list;
@@ -144,15 +145,15 @@ class Varying {
     };
     return one;
   }
-  MachineCandidate clock() const {
+  MachineCandidate clock(std::size_t waves) const {
     MachineCandidate one = named("_clock");
     one.candidate.parameters = {change(), change()};
     one.candidate.variants.clear();
     const double whole = design_.last_time - design_.first_time, fastest = 2 * design_.usual_gap;
     if (design_.timed && whole > 2 * fastest) {
       const double apart = waves_apart / whole;
-      for (int i = 0; i < most_waves && 1 / whole + i * apart <= 1 / fastest; ++i)
-        one.candidate.variants.push_back({1 / whole + i * apart});
+      for (double f = 1 / whole; one.candidate.variants.size() < waves && f <= 1 / fastest; f += apart)
+        one.candidate.variants.push_back({f});
       one.candidate.refine = {apart};
     } else {
       one.candidate.variants = {{1.0}};

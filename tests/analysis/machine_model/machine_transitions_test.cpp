@@ -6,6 +6,7 @@
 
 #include <cmath>
 #include <memory>
+#include <numbers>
 #include <string>
 
 #include "analysis/diagnosis/diagnosis.h"
@@ -64,6 +65,33 @@ INSTANTIATE_TEST_SUITE_P(MachineTransitions, WhatWasDone,
                          testing::Values(Done{"nothing", 0, 0, 0, 0}, Done{"bend", -0.05, 0, 0, -0.05},
                                          Done{"b_drift", 0, 0.3, 0, 0.3}, Done{"b_spread", 0, 0, 0.15, 0.15}),
                          [](const auto& instance) { return std::string(instance.param.cause); });
+
+// A sine of ten and of thirty periods in the record, which a few frequencies at equal ratios step over: such a clock
+// would pass for a memory of the noise.
+TEST(MachineTransitions, AClockIsFoundWhereverItsFrequencyLies) {
+  for (const double frequency : {0.0153, 0.047}) {
+    const auto at = [](std::size_t trial, std::size_t row) {
+      return 16.0 * static_cast<double>(trial) + 1.2 * static_cast<double>(row);
+    };
+    std::size_t row = 0, last = 0;
+    const auto next = [&](double x, double z, std::size_t trial) {
+      row = trial == last ? row + 1 : 1;
+      last = trial;
+      const double swing = std::sin(2 * std::numbers::pi * frequency * at(trial, row - 1));
+      return 0.8 * x + 0.3 + 0.2 * swing + 0.2 * z;
+    };
+    MachineRuns runs = scalar_runs(40, 12, 1.5, 0.05, 17, next);
+    for (std::size_t t = 0; t < runs.trials.size(); ++t)
+      for (std::size_t k = 0; k < runs.trials[t].rows.size(); ++k) runs.trials[t].rows[k].time = at(t, k);
+    const Diagnosis d = diagnosed(linear_machine(0.05), std::move(runs));
+    ASSERT_EQ(d.verdict, Verdict::explained) << said(d);
+    EXPECT_EQ(d.causes.set, std::vector<std::string>{"b_clock"}) << said(d);
+    for (const EstimatedParameter& found : d.causes.ranked.front().parameters[0]) {
+      const bool amplitude = found.name == "amplitude";
+      EXPECT_NEAR(found.value, amplitude ? 0.2 : frequency, amplitude ? 0.07 : 0.0005) << found.name << said(d);
+    }
+  }
+}
 
 // Trials begin at 1.5 +- 0.3. The launch that is stated is 0.3 off, or scatters less, or is right. The step is known
 // well: where its b could give way, a sensor whose zero is off would look the same. Where the launch is right, a gap is

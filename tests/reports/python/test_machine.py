@@ -165,7 +165,7 @@ class Refused(unittest.TestCase):
 
         for limit in (1, 3):
             self.check("step: the next swing_rad is NaN, and not marked as failed, from swing_rad", asked(for_noise_above(limit, False)))
-        self.check(", decay 0.97", asked(for_decay_above))
+        self.check(", decay 0.98", asked(for_decay_above))
         self.assertIsNotNone(asked(for_noise_above(3, True))().verdict)
 
     def test_a_step_that_writes_into_its_parameters(self):

@@ -137,7 +137,8 @@ class Outcomes(Columns):
         self.assertEqual(self.outcomes(Series(["failed", NAType()], RangeIndex(range(2)))), ["failed", None])
         self.refused("outcome: 5 is no trial", outcome=Series(["failed", "lost"], [1, 5]))
         self.refused("outcome: 1 is there twice", outcome=Series(["failed", "lost"], [1, 1]))
-        self.refused("outcome: 6 given, one for each of the 2 trials", outcome=Series(["failed"] * 6, RangeIndex(range(6))))
+        self.refused("outcome: 6 given, one for each of the 2 trials expected",
+                     outcome=Series(["failed"] * 6, RangeIndex(range(6))))
         turned, counted = [1, 1, 1, 0, 0, 0], RangeIndex(range(2))
         self.refused("so do the trials, which come in another order", trial=turned,
                      outcome=Series(["failed", "lost"], counted))
