@@ -477,7 +477,10 @@ Diagnosis answer(const TransitionModel& model, const Fitted& fitted, const std::
     d.limits.next = next_experiments(model, best->fit, rivals(ordered, d), d.rules, options.threads, options.seed);
   progress(1, "done");
   d.limits.at_bound = values_at_bound(model, cause);
-  d.sentences = sentences(d);
+  // A question about the data themselves, as of their unit, comes before what is made of them.
+  for (const std::string& note : d.data.notes)
+    if (note.ends_with('?')) d.sentences.push_back("First a question about these data: " + note);
+  std::ranges::move(sentences(d), std::back_inserter(d.sentences));
   for (const AtBound& one : d.limits.at_bound) d.sentences.push_back(at_bound_in_words(one));
   return std::move(d);
 }

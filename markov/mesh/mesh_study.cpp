@@ -36,8 +36,9 @@ constexpr std::size_t enough_trials =
 constexpr double widest = 4;        // of the interval: its end over its beginning, beyond which it is no answer
 constexpr double most_blind = 0.1;  // of the failures, in blind spots: beyond, bands are stepped over
 constexpr double row_error = 5e-4;  // what reading rows off curves may leave, about so much
-constexpr double narrow = 0.01;  // half-width, up to which shifts may scatter as much as what else the interval holds
-constexpr double little_scatter = 0.5;  // the share of that in a wider one: what it holds is told by many, else
+// Half-widths: up to the first, shifts may scatter as much as what else the interval holds, up to the second by this
+// share of it; the parts of a wider one are told by all shifts.
+constexpr double narrow = 0.01, wide = 0.1, little_scatter = 0.5;
 constexpr std::size_t fewest_shifts = 3, most_trials = 10000000;  // so many trials leave 0.03 % of the steps
 // A simulation of fewer trials than this is replaced by walks that do not end at a failure, with half of the steps that
 // the trials would have: an eighth of a quick study's time.
@@ -319,13 +320,10 @@ class Run {
     return mesh.bytes();
   }
 
-  double mesh_work(std::size_t size) const {
-    return std::pow(std::sqrt(2.0), static_cast<double>(size) * map_.dimension);
-  }
-
   double work_of_a_shift() const {
     double all = 0;
-    for (std::size_t size = 0; size < sizes_; ++size) all += mesh_work(size);
+    for (std::size_t size = 0; size < sizes_; ++size)
+      all += std::pow(2.0, 0.5 * static_cast<double>(size) * map_.dimension);
     return all;
   }
 
@@ -337,7 +335,8 @@ class Run {
 
   /// Returns whether further shifts would hardly narrow the intervals.
   bool settled() const {
-    return shifts_ > 0 && shifts_scatter_ <= (half_width(study_.steps) <= narrow ? 1 : little_scatter);
+    const double half = half_width(study_.steps);
+    return shifts_ > 0 && shifts_scatter_ <= (half <= narrow ? 1 : half <= wide ? little_scatter : 0);
   }
 
   /// Joins the shifts made so far.

@@ -72,7 +72,9 @@ Asked asked_of(const Arguments& given, bool several = false) {
 }
 
 double time_limit_of(const Arguments& given) {
-  return given.given("time_limit") ? given.number("time_limit") : usual_time_limit;
+  const double limit = given.given("time_limit") ? given.number("time_limit") : usual_time_limit;
+  if (!(limit > 0)) throw std::invalid_argument(fmt::format("time_limit: {:g} s, more than 0 expected", limit));
+  return limit;
 }
 
 WalkerRequest walker_request_of(const py::list& settings, const Arguments& given, const std::string& command) {

@@ -51,6 +51,36 @@ class LookedOver : public ::testing::Test {
 
 TEST_F(LookedOver, NothingIsSaidOfRunsAsTheyShouldBe) { EXPECT_EQ(said(), ""); }
 
+TEST_F(LookedOver, AStepThatHangsOnOtherRowsIsRefused) {
+  const auto right = machine_.step;
+  machine_.step = [&](const MachineBatch& batch) {  // the noise of the first row, for all
+    std::vector<double> scores(batch.rows, batch.scores[0]);
+    MachineBatch same = batch;
+    same.scores = scores;
+    right(same);
+  };
+  const std::string turned = message_of([&] { said(); });
+  EXPECT_NE(turned.find("when the rows stand in another order"), std::string::npos) << turned;
+  machine_.step = [&](const MachineBatch& batch) {  // the first number of each parameter, for all
+    std::vector<std::span<const double>> first;
+    for (const std::span<const double> values : batch.values) first.push_back(values.first(1));
+    MachineBatch same = batch;
+    same.values = first;
+    right(same);
+  };
+  const std::string mixed = message_of([&] { said(); });
+  EXPECT_NE(mixed.find("arrays of one number a row"), std::string::npos) << mixed;
+}
+
+TEST_F(LookedOver, NoiseThatChangesNothingIsNoted) {
+  machine_.scores = 2;
+  machine_.step = [](const MachineBatch& batch) {
+    for (std::size_t i = 0; i < batch.rows; ++i)
+      batch.next[i] = batch.value(0, i) * batch.states[i] + batch.value(1, i) + batch.value(2, i) * batch.scores[2 * i];
+  };
+  EXPECT_NE(said().find("number 2 of the noise changes nothing"), std::string::npos) << said();
+}
+
 // Trials of these runs begin at 1.5.
 TEST_F(LookedOver, LaunchesThatAreNotThoseStatedAreNoted) {
   machine_.launches = {{"x", 1.5, 0.1}};
