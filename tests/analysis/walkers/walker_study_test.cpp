@@ -41,7 +41,7 @@ TEST(WalkerStudy, FourDimensionsOnTheCoarsestMeshes) {
 TEST(WalkerStudy, SimplestWalkerIsWhatSimulationsSay) {
   WalkerSetting setting{Walker::simplest, 0.009 * per_radian, 0.0015 * per_radian, dynamics::Terrain::fresh};
   const WalkerStudy study =
-      study_walker(setting, {.spacing = 1.0, .margin = 6, .guided_samples = 0, .simulated_steps = 20000});
+      study_walker(setting, {.spacing = 1.0, .margin = 9, .guided_samples = 0, .simulated_steps = 20000});
   EXPECT_NEAR(study.passage.steps.value, 28.151, 0.45);
   EXPECT_LE(study.passage.steps.lower, 28.151 + 0.12);
   EXPECT_GE(study.passage.steps.upper, 28.151 - 0.12);
