@@ -477,10 +477,12 @@ Diagnosis answer(const TransitionModel& model, const Fitted& fitted, const std::
     d.limits.next = next_experiments(model, best->fit, rivals(ordered, d), d.rules, options.threads, options.seed);
   progress(1, "done");
   d.limits.at_bound = values_at_bound(model, cause);
-  // A question about the data themselves, as of their unit, comes before what is made of them.
+  d.sentences = sentences(d);
+  // A question about the data themselves, as of their unit, stands behind what is made of them.
+  const bool named = d.verdict == Verdict::explained || d.verdict == Verdict::partly_explained;
+  const auto behind = static_cast<std::ptrdiff_t>(std::min<std::size_t>(d.sentences.size(), named ? 2 : 1));
   for (const std::string& note : d.data.notes)
-    if (note.ends_with('?')) d.sentences.push_back("First a question about these data: " + note);
-  std::ranges::move(sentences(d), std::back_inserter(d.sentences));
+    if (note.ends_with('?')) d.sentences.insert(d.sentences.begin() + behind, "But a question comes first: " + note);
   for (const AtBound& one : d.limits.at_bound) d.sentences.push_back(at_bound_in_words(one));
   return std::move(d);
 }

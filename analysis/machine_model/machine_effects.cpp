@@ -17,8 +17,8 @@ constexpr double fine_step = 1e-4;        // of a range, for differences
 constexpr double widest_change = 0.5;     // of a nominal value, or
 constexpr double most_sds = 5;            //   of the sd with which it is known: how far a parameter may vary
 constexpr std::size_t fewest_trials = 5;  // whose spread is told
-// Frequencies of a clock, so many periods of the record apart: a sine between two of them shows nine tenths of itself
-// in the nearer one. All parameters that may vary share so many: of one they reach to 256 periods in the record.
+// Frequencies of a clock lie half a period of the record apart, where a sine between two of them shows nine tenths of
+// itself in the nearer one. All parameters that may vary share so many: those of one reach 256 periods in the record.
 constexpr std::size_t most_waves = 512, fewest_waves = 128;
 constexpr double waves_apart = 0.5;
 constexpr int stretches = 6;  // of the way

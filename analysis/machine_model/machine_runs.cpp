@@ -33,8 +33,9 @@ constexpr UnitFactor unit_factors[]{
 constexpr double values_apart = 0.15, scatters_apart = 0.5;  // of logarithms; scatter is known roughly
 constexpr double same_share = 1e-6;                          // of the largest value of a state, asked for twice
 constexpr std::size_t most_asked = 256;                      // rows that are asked about anew
-constexpr double move_share = 0.05;                          // of an effect's range, or of a parameter's value
-constexpr double mixed_share = 0.1;                          // of what the move changes: solvers share their steps
+constexpr double move_share = 0.05;  // A parameter is moved by this share of its value, an effect of its range.
+// Of what a move changes, and of a state, rows of moved and other parameters together may be off: solvers share steps.
+constexpr double mixed_share = 0.1, solver_share = 1e-4;
 constexpr double trials_apart = 0.5;                         // of logarithms, of trials that start anywhere
 constexpr double trials_alike = 0.4;                         // of that factor's logarithm: spread of trials in one unit
 constexpr double launch_off = 4;                             // standard errors: one machine in 16000 by chance
@@ -338,15 +339,21 @@ class AskedAnew {
         states_(machine.states.size()),
         scores_(static_cast<std::size_t>(machine.scores)),
         rows_(std::min(from.after.size(), most_asked)) {
-    for (std::size_t i = 0; i < rows_ * states_; ++i) from_.push_back(from.states[i]);
+    from_.assign(from.states.begin(), from.states.begin() + at(rows_ * states_));
     for (std::size_t i = 0; i < rows_ * scores_; ++i) noise_.push_back(std::sin(1.7 * static_cast<double>(i + 1)));
     for (const std::vector<double>& values : from.values)
-      nominal_.push_back(values.size() == 1 ? values : std::vector(values.begin(), values.begin() + at(rows_)));
+      nominal_.push_back(values.size() == 1 ? values : Values(values.begin(), values.begin() + at(rows_)));
     moved_ = nominal_;
     std::size_t v = 0;
-    for (const MachineParameter& p : machine.parameters) move(v++, p.sd > 0 ? p.sd : move_share * p.nominal, p.upper);
+    for (const MachineParameter& p : machine.parameters) {
+      // One that is neither fitted nor varies is only ever one number.
+      const bool varies = std::ranges::find(machine.may_vary, p.name) != machine.may_vary.end();
+      if (p.sd > 0 || varies) move(v, p.sd > 0 ? p.sd : move_share * std::abs(p.nominal), p.lower, p.upper);
+      ++v;
+    }
     for (const MachineEffect& effect : machine.effects)
-      for (const SuspectedParameter& p : effect.parameters) move(v++, move_share * (p.upper - p.lower), p.upper);
+      for (const SuspectedParameter& p : effect.parameters)
+        move(v++, move_share * (p.upper - p.lower), p.lower, p.upper);
   }
 
   // Returns what of the map hangs on more than its arguments; empty: nothing that was seen.
@@ -355,23 +362,26 @@ class AskedAnew {
     const Values plain = asked(from_, noise_, nominal_);
     if (!same(plain, asked(from_, noise_, nominal_)))
       return "it makes something else of the same states and noise when it is asked again; it must be a function of "
-             "its "
-             "arguments alone, and take what it draws from the noise";
-    const Values turned = asked(reversed(from_, states_), reversed(noise_, scores_), reversed_values());
+             "its arguments alone, and take what it draws from the noise";
+    Columns values = nominal_;
+    for (Values& one : values)
+      if (one.size() > 1) one = reversed(one, 1);
+    const Values turned = asked(reversed(from_, states_), reversed(noise_, scores_), values);
     if (!same(plain, reversed(turned, states_)))
       return "it makes something else of a row when the rows stand in another order; each row must be stepped by "
-             "itself, "
-             "with its own state, noise and parameters";
-    const Values moved = asked(from_, noise_, moved_), mixed = asked(from_, noise_, alternating());
-    for (std::size_t i = 0; i < plain.size(); ++i) {
-      const double right = i / states_ % 2 == 0 ? plain[i] : moved[i];
-      const double apart = std::abs(plain[i] - moved[i]);
-      if (std::isfinite(apart) && std::isfinite(mixed[i]) &&
-          std::abs(mixed[i] - right) > mixed_share * apart + same_share * std::abs(right))
-        return "it makes something else of a row when parameters are arrays of one number a row than with the same "
-               "numbers alone; each row must take its own";
-    }
+             "itself, with its own state, noise and parameters";
+    if (!each_takes_its_own(plain))
+      return "it makes something else of a row when parameters are arrays of one number a row than with the same "
+             "numbers alone; each row must take its own";
     return "";
+  }
+
+  // Lists the numbers of the noise, from 1 on, that changed nothing anywhere.
+  std::vector<std::size_t> idle() const {
+    std::vector<std::size_t> list;
+    for (std::size_t m = 0; m < scores_ && rows_ > 0; ++m)
+      if (idles(m, nominal_) && idles(m, moved_)) list.push_back(m + 1);
+    return list;
   }
 
  private:
@@ -379,9 +389,11 @@ class AskedAnew {
   using Columns = std::vector<Values>;
 
   static std::ptrdiff_t at(std::size_t i) { return static_cast<std::ptrdiff_t>(i); }
-  void move(std::size_t value, double by, double upper) {
+  // Moves a value up by as much as its bounds leave, or down where there is more room.
+  void move(std::size_t value, double by, double lower, double upper) {
     double& to = moved_[value][0];
-    to += to + by <= upper ? by : -by;
+    const double up = std::min(by, upper - to), down = std::min(by, to - lower);
+    to += up >= down ? std::max(0.0, up) : -down;
   }
   // Returns the next states, NaN where the machine failed.
   Values asked(const Values& states, const Values& noise, const Columns& values) const {
@@ -393,13 +405,47 @@ class AskedAnew {
       if (failed[i / states_]) next[i] = std::numeric_limits<double>::quiet_NaN();
     return next;
   }
+  Values largest(const Values& all) const {
+    Values most(states_, 0.0);
+    for (std::size_t i = 0; i < all.size(); ++i)
+      if (std::isfinite(all[i])) most[i % states_] = std::max(most[i % states_], std::abs(all[i]));
+    return most;
+  }
   bool same(const Values& a, const Values& b) const {
-    Values largest(states_, 0.0);
-    for (std::size_t i = 0; i < a.size(); ++i)
-      if (std::isfinite(a[i])) largest[i % states_] = std::max(largest[i % states_], std::abs(a[i]));
-    for (std::size_t i = 0; i < a.size(); ++i)
-      if (std::isfinite(a[i]) != std::isfinite(b[i]) || std::abs(a[i] - b[i]) > same_share * largest[i % states_])
-        return false;
+    const Values most = largest(a);
+    std::size_t flips = 0;  // of rows at the edge of a failure
+    for (std::size_t i = 0; i < a.size(); ++i) {
+      if (std::isfinite(a[i]) != std::isfinite(b[i])) ++flips;
+      if (std::abs(a[i] - b[i]) > same_share * most[i % states_]) return false;
+    }
+    return flips <= states_ * std::max<std::size_t>(2, rows_ / 50);
+  }
+  // Rows take nominal and moved values in turn; summed over them, each state must be what it is with these alone. A
+  // solver may share its steps among rows, and is as close as its tolerance.
+  bool each_takes_its_own(const Values& plain) const {
+    const Values moved = asked(from_, noise_, moved_), mixed = asked(from_, noise_, alternating()),
+                 most = largest(plain);
+    Values wrong(states_, 0.0), apart(states_, 0.0);
+    for (std::size_t i = 0; i < plain.size(); ++i) {
+      const double right = i / states_ % 2 == 0 ? plain[i] : moved[i];
+      if (!std::isfinite(plain[i] - moved[i]) || !std::isfinite(mixed[i])) continue;
+      wrong[i % states_] += std::abs(mixed[i] - right);
+      apart[i % states_] += 0.5 * std::abs(plain[i] - moved[i]);
+    }
+    for (std::size_t s = 0; s < states_; ++s)
+      if (wrong[s] > mixed_share * apart[s] + solver_share * most[s] * static_cast<double>(rows_)) return false;
+    return true;
+  }
+  bool idles(std::size_t score, const Columns& values) const {
+    std::optional<Values> first;
+    for (const double z : {-3.0, -1.5, -0.5, 0.5, 1.5, 3.0}) {
+      Values noise = noise_;
+      for (std::size_t i = 0; i < rows_; ++i) noise[i * scores_ + score] = z;
+      const Values next = asked(from_, noise, values);
+      if (!first) first = next;
+      for (std::size_t i = 0; i < next.size(); ++i)
+        if (next[i] != (*first)[i] && !(std::isnan(next[i]) && std::isnan((*first)[i]))) return false;
+    }
     return true;
   }
   Values reversed(const Values& all, std::size_t width) const {
@@ -408,18 +454,13 @@ class AskedAnew {
       turned.insert(turned.end(), all.begin() + at(i * width), all.begin() + at((i + 1) * width));
     return turned;
   }
-  Columns reversed_values() const {
-    Columns turned;
-    for (const Values& values : nominal_) turned.push_back(values.size() == 1 ? values : reversed(values, 1));
-    return turned;
-  }
-  // Returns the nominal values in every other row, and the moved ones between.
+  // Returns the nominal values in every other row and the moved ones between, of those that were moved.
   Columns alternating() const {
-    Columns mixed;
-    for (std::size_t v = 0; v < nominal_.size(); ++v) {
-      const auto in = [&](const Values& values, std::size_t row) { return values[values.size() == 1 ? 0 : row]; };
-      mixed.emplace_back();
-      for (std::size_t i = 0; i < rows_; ++i) mixed.back().push_back(in(i % 2 == 0 ? nominal_[v] : moved_[v], i));
+    Columns mixed = nominal_;
+    for (std::size_t v = 0; v < mixed.size(); ++v) {
+      if (nominal_[v][0] == moved_[v][0]) continue;
+      mixed[v].assign(rows_, nominal_[v][0]);
+      for (std::size_t i = 1; i < rows_; i += 2) mixed[v][i] = moved_[v][0];
     }
     return mixed;
   }
@@ -430,25 +471,13 @@ class AskedAnew {
   Columns nominal_, moved_;
 };
 
-// Refuses a map that hangs on more than its arguments, row by row.
-void require_function(const Machine& machine, const NominalSteps& from) {
-  if (const std::string fault = AskedAnew(machine, from).fault(); !fault.empty())
-    throw std::invalid_argument("step: " + fault);
-}
-
-// Says which noise changes nothing, wherever the nominal machine is.
-std::vector<std::string> idle_noise(const Machine& machine, const NominalSteps& from) {
+// Refuses a map that hangs on more than its arguments, row by row, and says which noise changes nothing.
+std::vector<std::string> ask_anew(const Machine& machine, const NominalSteps& from) {
+  const AskedAnew map(machine, from);
+  if (const std::string fault = map.fault(); !fault.empty()) throw std::invalid_argument("step: " + fault);
   std::vector<std::string> said;
-  if (from.after.empty()) return said;
-  for (std::size_t m = 0; m < static_cast<std::size_t>(machine.scores); ++m) {
-    const std::vector<double> up = stepped(machine, from, m, 1), down = stepped(machine, from, m, -1);
-    bool idle = true;
-    for (std::size_t i = 0; i < up.size() && idle; ++i)
-      idle = up[i] == down[i] || (std::isnan(up[i]) && std::isnan(down[i]));
-    if (idle)
-      said.push_back(
-          fmt::format("step: number {} of the noise changes nothing at the nominal parameters: is it used?", m + 1));
-  }
+  for (const std::size_t number : map.idle())
+    said.push_back(fmt::format("step: number {} of the noise changes nothing: it may not be used", number));
   return said;
 }
 
@@ -561,12 +590,10 @@ std::vector<std::string> look_over(const Machine& machine, const MachineRuns& ru
   }
   require_launch(machine, runs);
   const NominalSteps from = nominal_steps(machine, runs);
-  require_function(machine, from);
-  for (std::string& sentence : idle_noise(machine, from)) said.push_back(std::move(sentence));
-  for (std::string& sentence : doubled_trials(runs)) said.push_back(std::move(sentence));
-  for (std::string& sentence : other_units(machine, from)) said.push_back(std::move(sentence));
-  for (std::string& sentence : odd_trials(machine, runs)) said.push_back(std::move(sentence));
-  for (std::string& sentence : other_launches(machine, runs)) said.push_back(std::move(sentence));
+  for (const std::vector<std::string>& sentences :
+       {ask_anew(machine, from), doubled_trials(runs), other_units(machine, from), odd_trials(machine, runs),
+        other_launches(machine, runs)})
+    said.insert(said.end(), sentences.begin(), sentences.end());
   return said;
 }
 

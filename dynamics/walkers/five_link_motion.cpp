@@ -297,7 +297,7 @@ BipedFoot swing_foot(const BipedMotion& motion) { return foot_of(moving(motion))
 
 void follow_links(const BipedEquations& equations, std::span<const BipedMotion> from, std::span<const double> slopes,
                   std::span<std::optional<BipedMotion>> struck) {
-  if (has_eight_lanes())
+  if (slopes.size() > 4 && has_eight_lanes())
     follow_side_by_side<Eight>(equations, from, slopes, struck);
   else
     follow_side_by_side<Four>(equations, from, slopes, struck);

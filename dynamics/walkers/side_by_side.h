@@ -1,10 +1,10 @@
 #pragma once
-// Walkers side by side: a number of each in vectors as wide as the processor has them. For sources that CMake's
-// metastable_vectorize() compiles; results have the same bits at any width.
+// Holds numbers of walkers side by side, in vectors as wide as the processor has them. The sources that include it are
+// compiled by CMake's metastable_vectorize(); results have the same bits at any width.
 
 namespace metastable::dynamics {
 
-/// Hold a number of each of four or eight walkers.
+/// These hold a number of each of four or eight walkers.
 using Four = double __attribute__((vector_size(4 * sizeof(double))));
 using Eight = double __attribute__((vector_size(8 * sizeof(double))));
 

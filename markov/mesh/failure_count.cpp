@@ -31,8 +31,7 @@ double ForetoldHazard::at(std::uint64_t steps) const {
 bool FailureCount::refutes(const ForetoldHazard& hazard) const {
   const double h = hazard.at(longest);
   const auto n = static_cast<double>(walks), k = static_cast<double>(failed);
-  const double least = -std::expm1(-h * std::exp(-hazard.half_width)),
-               most = -std::expm1(-h * std::exp(hazard.half_width));
+  const double least = -std::expm1(-h * std::exp(-hazard.more)), most = -std::expm1(-h * std::exp(hazard.fewer));
   const bool too_many = failed > 0 && cdf(complement(Binomial(n, most), k - 1)) < refutation_level / 2;
   const bool too_few = failed < walks && cdf(Binomial(n, least), k) < refutation_level / 2;
   return too_many || too_few;

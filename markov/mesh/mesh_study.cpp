@@ -36,8 +36,8 @@ constexpr std::size_t enough_trials =
 constexpr double widest = 4;        // of the interval: its end over its beginning, beyond which it is no answer
 constexpr double most_blind = 0.1;  // of the failures, in blind spots: beyond, bands are stepped over
 constexpr double row_error = 5e-4;  // what reading rows off curves may leave, about so much
-// Half-widths: up to the first, shifts may scatter as much as what else the interval holds, up to the second by this
-// share of it; the parts of a wider one are told by all shifts.
+// In an interval of up to the first half-width, shifts may scatter as much as what else it holds, up to the second by
+// this share of it; the parts of a wider one are told by all shifts.
 constexpr double narrow = 0.01, wide = 0.1, little_scatter = 0.5;
 constexpr std::size_t fewest_shifts = 3, most_trials = 10000000;  // so many trials leave 0.03 % of the steps
 // A simulation of fewer trials than this is replaced by walks that do not end at a failure, with half of the steps that
@@ -379,7 +379,7 @@ class Run {
 
   ForetoldHazard hazard() const {
     return {study_.survival, tail_rate_, std::exp(steps_[0][sizes_ - 1]) / study_.steps.value,
-            half_width(study_.steps)};
+            std::log(study_.steps.value / study_.steps.lower), std::log(study_.steps.upper / study_.steps.value)};
   }
 
   std::vector<std::uint64_t> follow(std::size_t walks, std::uint64_t longest) const {

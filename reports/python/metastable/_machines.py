@@ -124,7 +124,7 @@ def _missing(one):
     """None, NaN, NaT, or the missing value of pandas, which can be compared with nothing."""
     if one is None or type(one).__name__ in ("NAType", "NaTType"):
         return True
-    return isinstance(one, (numbers.Real, numpy.datetime64, numpy.timedelta64)) and bool(one != one)
+    return isinstance(one, (numbers.Number, numpy.datetime64, numpy.timedelta64)) and bool(one != one)
 
 
 def _one_a_row(values, name, rows, kind=None):
@@ -190,7 +190,8 @@ def _require_no_mark(values, name, index):
     turns = index[1:] != index[:-1]
     between = ~(numpy.concatenate([[True], turns]) | numpy.concatenate([turns, [True]]))
     found, counts = numpy.unique(values[between & numpy.isfinite(values)], return_counts=True)
-    for one in found[(counts >= 3) & (found != 0)]:
+    often = counts >= max(3, 0.005 * len(values))  # between the ends of trials; counted in all rows below
+    for one in found[often & (found != 0)]:
         others = values[numpy.isfinite(values) & (values != one)]
         count = int((values == one).sum())
         if not len(others) or count < 0.01 * len(values):
@@ -220,6 +221,9 @@ class _LostRows:
             at = int((ahead < 1).argmax()) + 1
             raise InputError(f"step: it is {self.steps[at]:.15g} in {self._where(at)}, after {self.steps[at - 1]:.15g} "
                              "in the row before: steps are expected to rise within a trial")
+        if same.any() and ahead[same].min() > 1:
+            raise InputError(f"step: it rises by {ahead[same].min():.15g} at least from each row to the next: numbers of "
+                             "steps are expected, of which some rows may be missing; does it number something else?")
         self._require_few(ahead)
         self.goes_on = numpy.append(same, False)[:len(index)]  # the trial has another row
         self.after = numpy.append(ahead, 1)[:len(index)].astype(int) - 1  # lost ones, by the row before

@@ -25,7 +25,7 @@ TEST(FailureCount, RefutesAtItsLevel) {
   EXPECT_FALSE(refuted(5));
   EXPECT_FALSE(refuted(14));
   EXPECT_TRUE(refuted(15));
-  hazard.half_width = 0.1;  // somewhere in the mesh's interval it may be so
+  hazard.fewer = hazard.more = 0.1;  // somewhere in the mesh's interval it may be so
   EXPECT_FALSE(refuted(15));
 }
 
