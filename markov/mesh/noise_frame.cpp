@@ -156,7 +156,10 @@ std::vector<double> row_major(const MatrixXd& m) {
 /// Returns the frame around a state in which a covariance is the unit matrix, but for axes that are too narrow.
 NoiseFrame frame_of(const VectorXd& centre, const MatrixXd& covariance) {
   const VectorXd sd = covariance.diagonal().cwiseSqrt();
-  if (!(sd.minCoeff() > 0)) throw MapError("return map: the noise does not move every number of the state");
+  if (!(sd.minCoeff() > 0))
+    throw MapError(
+        "return map: along its gait the noise does not move every number of the state, or moves one alike to "
+        "either side; meshes need it to, splitting does not");
   const MatrixXd correlation = sd.cwiseInverse().asDiagonal() * covariance * sd.cwiseInverse().asDiagonal();
   const SymmetricEigen eigen = symmetric_eigen(correlation);
   const VectorXd widths = eigen.values.reverse().cwiseMax(0).cwiseSqrt();

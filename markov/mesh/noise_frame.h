@@ -38,8 +38,8 @@ class TooManyDimensions : public std::invalid_argument {
 /// the change from -1 to 1 sd, that change counts. An axis narrower than 0.05 of the widest counts as that wide: bent
 /// landings would fill it with nodes that tell nothing (a compass on facets takes twelve times fewer).
 /// @throws NoOrbit when the map fails without noise or right beside that, does not settle, or is unstable, naming the
-/// state; MapError as checked_step does, and when the noise does not move every number of the state;
-/// TooManyDimensions
+/// state; MapError as checked_step does, and when the noise does not move every number of the state, or one alike to
+/// either side; TooManyDimensions
 std::vector<NoiseFrame> noise_frames(const BatchMap& map, std::span<const double> start);
 
 /// Holds the noise-free orbit, by the frames around it, and how what is beside it comes back.
