@@ -586,8 +586,9 @@ MeshStudy mesh_study(const BatchMap& map, std::span<const double> start, const M
 }
 
 std::string disagreement(const char* one, const MeshEstimate& a, const char* other, const MeshEstimate& b) {
-  const double apart = std::abs(std::log(a.value / b.value));
-  if (!(a.lower > 0 && b.lower > 0) || apart <= disagrees * std::hypot(half_width(a), half_width(b))) return {};
+  const auto& [less, more] = std::minmax(a, b, [](const auto& x, const auto& y) { return x.value < y.value; });
+  const double facing = std::hypot(std::log(less.upper / less.value), std::log(more.value / more.lower));
+  if (!(a.lower > 0 && b.lower > 0) || std::log(more.value / less.value) <= disagrees * facing) return {};
   return fmt::format("{} ({:.4g} steps, {:.4g} to {:.4g}) and {} ({:.4g}, {:.4g} to {:.4g}) disagree", one, a.value,
                      a.lower, a.upper, other, b.value, b.lower, b.upper);
 }

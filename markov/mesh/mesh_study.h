@@ -127,15 +127,15 @@ class RefutedMesh : public Disagreement {
 /// 100 or more fit into `simulated_steps`, else 512 walks of half so many steps together, whose failures are counted
 /// (FailureCount). Windows are as long as the mesh foretells (reaching_window) and lengthened until the samples'
 /// weights are even; where they stay uneven, the interval is widened in proportion, and beyond a factor of about two
-/// not given. Two ways disagree when they lie further apart than 1.7 times (99.9 %) their joint 95 % half-width, and a
-/// count of failures when the mesh foretells one so far off with a chance below refutation_level. Where the noise leads
-/// to other gaits (OtherGaits), meshes grow from those too and are solved by coupled_passage(); failures are then
-/// counted only, and no samples are guided: both would start in one gait and know nothing of the others. No number is
-/// given either where a gait is a trap, where blind spots may hold more than a tenth of the failures, or where the
-/// interval is wider than a factor of four. Rows are read off states around their nodes where the chance of failing
-/// jumps from one state to the next (failing_jumps). A dear map's meshes grow side by side, as many as half the memory
-/// holds, in joined steps. The coarsest mesh comes first: what the finest will take, nodes by the spacing's power and
-/// entries with them, is foreseen from it.
+/// not given. Two ways disagree when they lie further apart than 1.7 times (99.9 %) the joint 95 % half-width of the
+/// sides that face each other, and a count of failures when the mesh foretells one so far off with a chance below
+/// refutation_level. Where the noise leads to other gaits (OtherGaits), meshes grow from those too and are solved by
+/// coupled_passage(); failures are then counted only, and no samples are guided: both would start in one gait and know
+/// nothing of the others. No number is given either where a gait is a trap, where blind spots may hold more than a
+/// tenth of the failures, or where the interval is wider than a factor of four. Rows are read off states around their
+/// nodes where the chance of failing jumps from one state to the next (failing_jumps). A dear map's meshes grow side by
+/// side, as many as half the memory holds, in joined steps. The coarsest mesh comes first: what the finest will take,
+/// nodes by the spacing's power and entries with them, is foreseen from it.
 /// @param start  a state at phase 0
 /// @throws Disagreement where a gait is a trap, or meshes find no failure and simulation does; std::length_error before
 /// the other meshes are made if they would take more than most_bytes; as Mesh, noise_frames and mesh_passage do, with
