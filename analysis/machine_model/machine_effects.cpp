@@ -18,7 +18,8 @@ constexpr double widest_change = 0.5;     // of a nominal value, or
 constexpr double most_sds = 5;            //   of the sd with which it is known: how far a parameter may vary
 constexpr std::size_t fewest_trials = 5;  // whose spread is told
 // Frequencies of a clock lie half a period of the record apart, where a sine between two of them shows nine tenths of
-// itself in the nearer one. All parameters that may vary share so many: those of one reach 256 periods in the record.
+// itself in the nearer one. All parameters that may vary share 512 frequencies: those of a single one reach 256 periods
+// in the record.
 constexpr std::size_t most_waves = 512, fewest_waves = 128;
 constexpr double waves_apart = 0.5;
 constexpr int stretches = 6;  // of the way

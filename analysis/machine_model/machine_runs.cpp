@@ -34,7 +34,8 @@ constexpr double values_apart = 0.15, scatters_apart = 0.5;  // of logarithms; s
 constexpr double same_share = 1e-6;                          // of the largest value of a state, asked for twice
 constexpr std::size_t most_asked = 256;                      // rows that are asked about anew
 constexpr double move_share = 0.05;  // A parameter is moved by this share of its value, an effect of its range.
-// Of what a move changes, and of a state, rows of moved and other parameters together may be off: solvers share steps.
+// Solvers share their steps among rows. What each state differs by, summed over rows, may hence be the first share of
+// what the moved parameters change, and the second one of the state's largest value.
 constexpr double mixed_share = 0.1, solver_share = 1e-4;
 constexpr double trials_apart = 0.5;                         // of logarithms, of trials that start anywhere
 constexpr double trials_alike = 0.4;                         // of that factor's logarithm: spread of trials in one unit
@@ -316,19 +317,25 @@ NominalSteps nominal_steps(const Machine& machine, const MachineRuns& runs) {
   return all;
 }
 
-// The next states with one score at `z` and the others at zero; NaN where the machine failed.
-std::vector<double> stepped(const Machine& machine, const NominalSteps& from, std::size_t score, double z) {
-  const std::size_t rows = from.after.size(), m = static_cast<std::size_t>(machine.scores);
-  std::vector<double> scores(rows * m, 0.0), next(from.states.size(), 0.0);
-  for (std::size_t i = 0; i < rows; ++i) scores[i * m + score] = z;
+// Returns the next states, NaN where the machine failed.
+std::vector<double> next_states(const Machine& machine, const std::vector<double>& states,
+                                const std::vector<double>& scores, const std::vector<std::vector<double>>& values) {
+  const std::size_t width = machine.states.size(), rows = states.size() / width;
+  std::vector<double> next(states.size(), 0.0);
   std::vector<std::uint8_t> failed(rows);
-  const std::vector<std::span<const double>> spans(from.values.begin(), from.values.end());
-  machine.step({rows, from.states, scores, spans, next, failed});
-  for (std::size_t i = 0; i < rows; ++i)
-    if (failed[i])
-      for (std::size_t s = 0; s < machine.states.size(); ++s)
-        next[i * machine.states.size() + s] = std::numeric_limits<double>::quiet_NaN();
+  const std::vector<std::span<const double>> spans(values.begin(), values.end());
+  machine.step({rows, states, scores, spans, next, failed});
+  for (std::size_t i = 0; i < next.size(); ++i)
+    if (failed[i / width]) next[i] = std::numeric_limits<double>::quiet_NaN();
   return next;
+}
+
+// Returns them with one score at `z` and the others at zero.
+std::vector<double> stepped(const Machine& machine, const NominalSteps& from, std::size_t score, double z) {
+  const auto m = static_cast<std::size_t>(machine.scores);
+  std::vector<double> scores(from.after.size() * m, 0.0);
+  for (std::size_t i = 0; i < from.after.size(); ++i) scores[i * m + score] = z;
+  return next_states(machine, from.states, scores, from.values);
 }
 
 // Asks the map about a few rows in several ways that must not matter.
@@ -346,7 +353,7 @@ class AskedAnew {
     moved_ = nominal_;
     std::size_t v = 0;
     for (const MachineParameter& p : machine.parameters) {
-      // One that is neither fitted nor varies is only ever one number.
+      // A parameter that is neither fitted nor varies is only ever one number.
       const bool varies = std::ranges::find(machine.may_vary, p.name) != machine.may_vary.end();
       if (p.sd > 0 || varies) move(v, p.sd > 0 ? p.sd : move_share * std::abs(p.nominal), p.lower, p.upper);
       ++v;
@@ -356,7 +363,7 @@ class AskedAnew {
         move(v++, move_share * (p.upper - p.lower), p.lower, p.upper);
   }
 
-  // Returns what of the map hangs on more than its arguments; empty: nothing that was seen.
+  // Says what of the map's answers hangs on more than its arguments; it is empty where nothing of the kind was seen.
   std::string fault() const {
     if (rows_ == 0) return "";
     const Values plain = asked(from_, noise_, nominal_);
@@ -395,15 +402,8 @@ class AskedAnew {
     const double up = std::min(by, upper - to), down = std::min(by, to - lower);
     to += up >= down ? std::max(0.0, up) : -down;
   }
-  // Returns the next states, NaN where the machine failed.
   Values asked(const Values& states, const Values& noise, const Columns& values) const {
-    Values next(states.size(), 0.0);
-    std::vector<std::uint8_t> failed(rows_);
-    const std::vector<std::span<const double>> spans(values.begin(), values.end());
-    machine_.step({rows_, states, noise, spans, next, failed});
-    for (std::size_t i = 0; i < next.size(); ++i)
-      if (failed[i / states_]) next[i] = std::numeric_limits<double>::quiet_NaN();
-    return next;
+    return next_states(machine_, states, noise, values);
   }
   Values largest(const Values& all) const {
     Values most(states_, 0.0);
@@ -413,7 +413,7 @@ class AskedAnew {
   }
   bool same(const Values& a, const Values& b) const {
     const Values most = largest(a);
-    std::size_t flips = 0;  // of rows at the edge of a failure
+    std::size_t flips = 0;  // Rows at the edge of a failure may fail in one order and not in another.
     for (std::size_t i = 0; i < a.size(); ++i) {
       if (std::isfinite(a[i]) != std::isfinite(b[i])) ++flips;
       if (std::abs(a[i] - b[i]) > same_share * most[i % states_]) return false;

@@ -39,7 +39,8 @@ inline constexpr std::size_t legs_at_once = 128;
 using StruckLegs = std::array<std::optional<LegMotion>, legs_at_once>;
 
 /// Follows up to legs_at_once walkers to just before their feet strike. The swing foot strikes when it comes down
-/// before the stance foot. Nothing of a walker whose stance leg lies down, or that takes longer than `course.longest`.
+/// before the stance foot. Nothing is returned of a walker whose stance leg
+/// lies down, or that takes longer than `course.longest`.
 /// A walker's bits do not depend on the others.
 /// @param from, slopes [rad], equations, courses  of each walker
 StruckLegs follow_legs(std::span<const LegMotion> from, std::span<const double> slopes,

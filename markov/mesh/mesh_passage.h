@@ -10,8 +10,8 @@
 namespace metastable::markov {
 
 struct MeshPassage {
-  /// Expected steps before failure from the start, the failing one included: what leaves the mesh goes on as the others
-  /// do, which is too long where it is likelier to fail.
+  /// Expected steps before failure from the start, the failing one included. Walkers that leave the mesh count as if
+  /// they went on like the others; where they are likelier to fail than those, the number is too large.
   double steps = 0;
   double steps_lower = 0;            ///< if what leaves the mesh failed at once
   double failure_rate = 0;           ///< a step, once settled: distribution . kill (for phases: of the mean step)

@@ -116,9 +116,9 @@ class RefutedMesh : public Disagreement {
 /// Solves `sizes` meshes of each shift, extrapolates ln T to spacing 0 (h^2 and h^4, with four sizes h^6) for each
 /// shift by itself. There are three shifts, and one more at a time, `shifts` at most, until their t-interval is no
 /// wider than the other two parts of the interval together, and in an interval that is not narrow (1 %) half as wide.
-/// The interval joins, as a root of squares, the t-interval over the shifts and the discretization error; what leaves
-/// the mesh goes on as survivors do, and at the lower end it fails: the bracket of both, and on its side what blind
-/// spots may hold, is added. The discretization error is the difference from the extrapolation without the coarsest
+/// The interval joins, as a root of squares, the t-interval over the shifts and the discretization error; Walkers
+/// that leave the mesh count as survivors, and at the lower end of the interval as failed; what blind spots may hold is
+/// added on its side. The discretization error is the difference from the extrapolation without the coarsest
 /// size; with four sizes, at least that between the two triples'. Meshes coarser than the default count it by the
 /// square of the ratio of their spacings: the sizes show less and less of it.
 ///

@@ -66,8 +66,8 @@ INSTANTIATE_TEST_SUITE_P(MachineTransitions, WhatWasDone,
                                          Done{"b_drift", 0, 0.3, 0, 0.3}, Done{"b_spread", 0, 0, 0.15, 0.15}),
                          [](const auto& instance) { return std::string(instance.param.cause); });
 
-// A sine of ten and of thirty periods in the record, which a few frequencies at equal ratios step over: such a clock
-// would pass for a memory of the noise.
+// The record holds some ten and thirty periods of the sine. A list of few frequencies at equal ratios has none near
+// enough, and the clock passes for a memory of the noise.
 TEST(MachineTransitions, AClockIsFoundWhereverItsFrequencyLies) {
   for (const double frequency : {0.0153, 0.047}) {
     const auto at = [](std::size_t trial, std::size_t row) {
