@@ -480,9 +480,10 @@ Diagnosis answer(const TransitionModel& model, const Fitted& fitted, const std::
   d.sentences = sentences(d);
   // A question about the data themselves, as of their unit, stands behind what is made of them.
   const bool named = d.verdict == Verdict::explained || d.verdict == Verdict::partly_explained;
-  const auto behind = static_cast<std::ptrdiff_t>(std::min<std::size_t>(d.sentences.size(), named ? 2 : 1));
+  auto behind =
+      d.sentences.begin() + static_cast<std::ptrdiff_t>(std::min<std::size_t>(d.sentences.size(), named ? 2 : 1));
   for (const std::string& note : d.data.notes)
-    if (note.ends_with('?')) d.sentences.insert(d.sentences.begin() + behind, "But a question comes first: " + note);
+    if (note.ends_with('?')) behind = std::next(d.sentences.insert(behind, "But a question comes first: " + note));
   for (const AtBound& one : d.limits.at_bound) d.sentences.push_back(at_bound_in_words(one));
   return std::move(d);
 }

@@ -153,7 +153,9 @@ class Varying {
     const double whole = design_.last_time - design_.first_time, fastest = 2 * design_.usual_gap;
     if (design_.timed && whole > 2 * fastest) {
       const double apart = waves_apart / whole;
-      for (double f = 1 / whole; one.candidate.variants.size() < waves && f <= 1 / fastest; f += apart)
+      // The fastest frequency itself is left out, as rounding would decide whether the list reaches it.
+      const double end = 0.999 / fastest;
+      for (double f = 1 / whole; one.candidate.variants.size() < waves && f < end; f += apart)
         one.candidate.variants.push_back({f});
       one.candidate.refine = {apart};
     } else {

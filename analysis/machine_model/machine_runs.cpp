@@ -32,7 +32,7 @@ constexpr UnitFactor unit_factors[]{
     {0.001, "thousands of the machine's unit", "thousands of the others' unit"}};
 constexpr double values_apart = 0.15, scatters_apart = 0.5;  // of logarithms; scatter is known roughly
 constexpr double same_share = 1e-6;                          // of the largest value of a state, asked for twice
-constexpr std::size_t most_asked = 256;                      // rows that are asked about anew
+constexpr std::size_t most_asked = 256;                      // At most so many rows are asked about anew.
 constexpr double move_share = 0.05;  // A parameter is moved by this share of its value, an effect of its range.
 // Solvers share their steps among rows. What each state differs by, summed over rows, may hence be the first share of
 // what the moved parameters change, and the second one of the state's largest value.

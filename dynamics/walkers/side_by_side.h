@@ -15,8 +15,8 @@ using Eight = double __attribute__((vector_size(8 * sizeof(double))));
 #define METASTABLE_EIGHT_LANES
 #endif
 
-/// Says whether the processor works on eight numbers at once. Put together from smaller vectors they are slower than
-/// four.
+/// Says whether the processor works on eight numbers at once. Vectors of eight that are put together from smaller ones
+/// are slower than those of four.
 inline bool has_eight_lanes() {
 #ifdef METASTABLE_AVX2
   static const bool has = __builtin_cpu_supports("avx512f");

@@ -18,7 +18,7 @@ struct ForetoldHazard {
   std::vector<double> survival;  ///< [k]: share that walks on after k + 1 steps; beyond the last at `rate` a step
   double rate = 0;               ///< chance of failing in a step, once settled
   double scale = 1;              ///< of H: the mesh's expected steps over the extrapolated ones
-  double fewer = 0, more = 0;  ///< by which the expected steps may be less and more, as logarithms: their 95 % interval
+  double fewer = 0, more = 0;    ///< logarithms: how many times fewer and more steps their 95 % interval allows
 
   double at(std::uint64_t steps) const;
 };

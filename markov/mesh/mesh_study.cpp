@@ -31,8 +31,7 @@ constexpr double sampled_windows = 3;     // of guided samples: within one, fail
 constexpr int longest_window = 200;       // of guided samples [steps]
 constexpr double least_even_share = 0.5;  // effective samples a sample: below, their scatter tells too small an error
 constexpr double sampled_from = 100;      // expected steps above which guided samples settle before they fail
-constexpr std::size_t enough_trials =
-    4000;                           // to failure: their mean is as well known (1.6 %) as what guided samples say
+constexpr std::size_t enough_trials = 4000;  // Failures of so many trials tell as much (1.6 %) as guided samples.
 constexpr double widest = 4;        // of the interval: its end over its beginning, beyond which it is no answer
 constexpr double most_blind = 0.1;  // of the failures, in blind spots: beyond, bands are stepped over
 constexpr double row_error = 5e-4;  // what reading rows off curves may leave, about so much
@@ -328,8 +327,8 @@ class Run {
   }
 
   void list_sizes() {
-    for (std::size_t shift = 0; shift < shifts_; ++shift)
-      for (std::size_t size = 0; size < sizes_; ++size)
+    for (std::size_t size = 0; size < sizes_; ++size)
+      for (std::size_t shift = 0; shift < shifts_; ++shift)
         study_.sizes[size].steps.push_back(std::exp(steps_[shift][size]));
   }
 
@@ -353,7 +352,8 @@ class Run {
     const Extrapolated by_steps = extrapolated(steps_), by_rate = extrapolated(rates_);
     shifts_scatter_ = std::max(by_steps.shift_error / (by_steps.discretization_error + study_.bracket),
                                by_rate.shift_error / (by_rate.discretization_error + study_.bracket));
-    study_.shift_error = by_steps.shift_error, study_.discretization_error = by_steps.discretization_error;
+    study_.shift_error = by_steps.shift_error;
+    study_.discretization_error = by_steps.discretization_error;
     study_.steps = around(by_steps);
     study_.steps.lower *= std::exp(-study_.bracket);
     study_.failure_rate = around(by_rate);

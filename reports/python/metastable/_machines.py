@@ -139,7 +139,7 @@ def _floats(values, name, rows):
     if numpy.ma.isMaskedArray(values):
         raise TypeError(f"{name}: a masked array is given: fill what is missing with NaN")
     array = _one_a_row(values, name, rows)
-    if array.dtype.kind in "mMc":  # numpy would count nanoseconds, or drop the imaginary part
+    if array.dtype.kind in "mMc":  # NumPy would count nanoseconds, or drop the imaginary part.
         raise TypeError(f"{name}: an array of numbers expected, not of {array.dtype}")
     if array.dtype == object:
         array = numpy.array([math.nan if _missing(one) else one for one in array], object)
@@ -190,7 +190,7 @@ def _require_no_mark(values, name, index):
     turns = index[1:] != index[:-1]
     between = ~(numpy.concatenate([[True], turns]) | numpy.concatenate([turns, [True]]))
     found, counts = numpy.unique(values[between & numpy.isfinite(values)], return_counts=True)
-    often = counts >= max(3, 0.005 * len(values))  # between the ends of trials; counted in all rows below
+    often = counts >= max(3, 0.005 * len(values))  # These rows stand between the ends of trials; all rows count below.
     for one in found[often & (found != 0)]:
         others = values[numpy.isfinite(values) & (values != one)]
         count = int((values == one).sum())
@@ -222,14 +222,14 @@ class _LostRows:
             raise InputError(f"step: it is {self.steps[at]:.15g} in {self._where(at)}, after {self.steps[at - 1]:.15g} "
                              "in the row before: steps are expected to rise within a trial")
         if same.any() and ahead[same].min() > 1:
-            raise InputError(f"step: it rises by {ahead[same].min():.15g} at least from each row to the next: numbers of "
-                             "steps are expected, of which some rows may be missing; does it number something else?")
+            raise InputError(f"step: it rises by {ahead[same].min():.15g} at least from each row to the next: numbers "
+                             "of steps are expected, of which some may be missing; does it number something else?")
         self._require_few(ahead)
-        self.goes_on = numpy.append(same, False)[:len(index)]  # the trial has another row
-        self.after = numpy.append(ahead, 1)[:len(index)].astype(int) - 1  # lost ones, by the row before
+        self.goes_on = numpy.append(same, False)[:len(index)]  # The trial has another row behind this one.
+        self.after = numpy.append(ahead, 1)[:len(index)].astype(int) - 1  # This many lost rows follow each row.
         self.source = numpy.repeat(numpy.arange(len(index)), 1 + self.after)
-        self.place = numpy.arange(len(index)) + numpy.cumsum(self.after) - self.after  # of the rows given
-        self.ahead = numpy.arange(len(self.source)) - self.place[self.source]  # 0: given
+        self.place = numpy.arange(len(index)) + numpy.cumsum(self.after) - self.after  # Here the rows given stand.
+        self.ahead = numpy.arange(len(self.source)) - self.place[self.source]  # It is 0 for a row that was given.
         self.lost = self.ahead > 0
 
     def _require_few(self, ahead):
@@ -258,7 +258,7 @@ class _LostRows:
         """An input, which a step needs: known where it is the same for all steps of its trial."""
         for row in numpy.flatnonzero(self.after):
             begin, end = numpy.searchsorted(self.index, [self.index[row], self.index[row] + 1])
-            if (values[begin:end - 1] != values[row]).any():  # the last row has no step
+            if (values[begin:end - 1] != values[row]).any():  # The last row has no step.
                 self._refuse(row, 1, f"inputs: {name}", name)
         return values[self.source]
 

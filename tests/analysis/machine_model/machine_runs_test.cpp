@@ -53,7 +53,7 @@ TEST_F(LookedOver, NothingIsSaidOfRunsAsTheyShouldBe) { EXPECT_EQ(said(), ""); }
 
 TEST_F(LookedOver, AStepThatHangsOnOtherRowsIsRefused) {
   const auto right = machine_.step;
-  machine_.step = [&](const MachineBatch& batch) {  // the noise of the first row, for all
+  machine_.step = [&](const MachineBatch& batch) {  // It takes the noise of the first row for all.
     std::vector<double> scores(batch.rows, batch.scores[0]);
     MachineBatch same = batch;
     same.scores = scores;
@@ -61,7 +61,7 @@ TEST_F(LookedOver, AStepThatHangsOnOtherRowsIsRefused) {
   };
   const std::string turned = message_of([&] { said(); });
   EXPECT_NE(turned.find("when the rows stand in another order"), std::string::npos) << turned;
-  machine_.step = [&](const MachineBatch& batch) {  // the first number of each parameter, for all
+  machine_.step = [&](const MachineBatch& batch) {  // It takes the first number of each parameter for all.
     std::vector<std::span<const double>> first;
     for (const std::span<const double> values : batch.values) first.push_back(values.first(1));
     MachineBatch same = batch;

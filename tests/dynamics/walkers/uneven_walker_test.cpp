@@ -218,7 +218,7 @@ TEST(UnevenWalker, DoesNotDependOnItsNeighbours) {
   UnevenWalker other;
   other.stance.mass_to_hip = other.swing.mass_to_hip = 0.3;
   other.hip_friction = 1;
-  std::vector<UnevenWalker> many(20, other);  // more than go side by side
+  std::vector<UnevenWalker> many(20, other);  // These are more than go side by side.
   many.back() = UnevenWalker{};
   std::vector<double> states;
   for (std::size_t i = 0; i + 1 < many.size(); ++i)
