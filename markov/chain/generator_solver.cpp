@@ -124,6 +124,10 @@ Row GeneratorSolver::solve_left(std::span<const Extended> rhs) {
   return y;
 }
 
+bool GeneratorSolver::iterates() const {
+  return std::any_of(parts_.begin(), parts_.end(), [](const Part& part) { return part.iterated != nullptr; });
+}
+
 std::span<const Extended> GeneratorSolver::visits() const {
   if (parts_.size() != 1 || !parts_[0].iterated) return {};
   return parts_[0].iterated->visits();

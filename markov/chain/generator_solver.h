@@ -37,6 +37,9 @@ class GeneratorSolver {
   SplitVector solve_split(std::span<const Extended> rhs);
   /// Solves y (I - Q) = rhs (row vectors).
   std::vector<Extended> solve_left(std::span<const Extended> rhs);
+  /// Returns whether some class is iterated: entries there are right to rounding of the largest, and not each for
+  /// itself.
+  bool iterates() const;
   /// Returns visits to begin with for a generator of nearly the same rates; empty unless one iteration has all states.
   std::span<const Extended> visits() const;
 

@@ -9,6 +9,7 @@
 #include <stdexcept>
 
 #include "markov/passage/distribution_bound.h"
+#include "markov/passage/nested_solver.h"
 
 namespace metastable::markov {
 namespace {
@@ -98,7 +99,7 @@ void sweep(const Chain& chain, const Row& right, Row& v, const Heard& heard) {
 }
 
 /// Bounds the relative error of v, (I - Q) v = right.
-double relative_error(const Chain& chain, GeneratorSolver& solver, const Row& right, const SplitVector& v) {
+double relative_error(const Chain& chain, NestedSolver& solver, const Row& right, const SplitVector& v) {
   Row leave(chain.size());
   Extended most = 0;
   for (std::size_t i = 0; i < leave.size(); ++i) {
@@ -107,7 +108,7 @@ double relative_error(const Chain& chain, GeneratorSolver& solver, const Row& ri
     const Extended off = std::abs(one.value - right[i]) + one.error;
     if (off > 0) most = std::max(most, off / leave[i]);
   }
-  const SplitVector z = solver.solve_split(leave);
+  const SplitVector z = solver.solve(leave);
   Extended reached = 1, largest = 0;
   for (std::size_t i = 0; i < leave.size(); ++i) {
     const Difference one = difference(chain, i, z);
@@ -137,11 +138,12 @@ Decided decided(const Chain& inside, GeneratorSolver& solver, const std::vector<
       if (!comes[into.row[e]]) comes[into.row[e]] = 1, queue.push_back(into.row[e]);
   }
   const Row right(entering.begin(), entering.end());
-  SplitVector v = solver.solve_split(right);
-  for (std::size_t i = 0; i < right.size(); ++i) v.rest[i] = comes[i] ? std::max<Extended>(0, v.sum(i)) : 0;
+  NestedSolver nested(inside, solver, comes, heard);
+  SplitVector v = nested.solve(right);
+  for (std::size_t i = 0; i < right.size(); ++i) v.rest[i] = v.sum(i);
   std::fill(v.base.begin(), v.base.end(), Extended{0});
   sweep(inside, right, v.rest, heard);
-  Decided decided{{v.rest.begin(), v.rest.end()}, relative_error(inside, solver, right, v)};
+  Decided decided{{v.rest.begin(), v.rest.end()}, relative_error(inside, nested, right, v)};
   if (!(decided.error <= widest_bound)) refuse("probabilities", decided.error);
   return decided;
 }
