@@ -110,9 +110,8 @@ std::vector<Grade> share_grades(const std::vector<BlindTruth>& truths, const std
     for (const BlindAnswer::SaidAtWork& said : answers[i]->at_work)
       for (std::size_t e = 0; e < truth.effects.size(); ++e) {
         if (said.probability < Rules{}.least_at_work || said.effects != std::vector{truth.effects[e].id}) continue;
-        const double left = truth.effects.size() == 1 ? truth.left : truth.left_by_effect[e];
         count(alone, said.alone, truth.gap_as_given->alone[e] / truth.gap_as_given->all);
-        count(beside, said.beside, left / truth.gap_as_given->all);
+        count(beside, said.beside, truth.gap_as_given->beside[e] / truth.gap_as_given->all);
       }
   }
   return {{"shares of the gap that effects close alone: 90 % intervals hold", alone, 0.87, 0.93},

@@ -15,8 +15,8 @@ std::vector<Grade> at_work_grades(const std::vector<BlindTruth>& truths,
                                   const std::vector<std::optional<BlindAnswer>>& answers);
 
 /// Says how often the intervals of the shares that the effects at work close, alone and beside the others, hold what
-/// they truly close: of cases without anything from outside whose truth gains 9 and more, by truth.gap_as_given. That
-/// is of the case's own data, with fitted sizes, where the answer's shares are held out.
+/// they close in the mean over experiments: of cases without anything from outside whose truth gains 9 and more, by
+/// truth.gap_as_given.
 std::vector<Grade> share_grades(const std::vector<BlindTruth>& truths,
                                 const std::vector<std::optional<BlindAnswer>>& answers);
 

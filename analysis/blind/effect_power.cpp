@@ -2,6 +2,9 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
+#include <cstdint>
+#include <memory>
 #include <stdexcept>
 
 #include "analysis/blind/outside_power.h"
@@ -11,6 +14,9 @@
 
 namespace metastable::analysis {
 namespace {
+
+constexpr std::uint64_t draws_of_gap = 16;  // experiments over which a gap's likelihoods are averaged,
+constexpr std::size_t fits_of_gap = 4;      //   and those of them that parameters are fitted to
 
 dynamics::NominalValues contact_of(const dynamics::NominalValues& stated,
                                    const std::vector<dynamics::Effect>& effects) {
@@ -30,6 +36,30 @@ std::vector<EffectTerm> terms_of(const TransitionModel& model, const std::vector
   for (const dynamics::Effect& effect : effects)
     if (effect.id != dynamics::contact_distribution_id) terms.push_back(fitted_term(model, effect));
   return terms;
+}
+
+// Nuisances with effects, as a model supposes them.
+struct Supposed {
+  std::vector<double> nuisance;
+  std::vector<EffectTerm> terms;
+};
+
+// Returns what fits best in the mean over experiments. Of those it is fitted to a fit gains as much by chance as it
+// loses on as many others.
+Supposed best_supposed(const std::vector<std::unique_ptr<TransitionModel>>& drawn, const Supposed& start,
+                       bool recalibrated) {
+  Supposed mean = start;
+  const auto add = [](std::vector<double>& sum, const std::vector<double>& values) {
+    for (std::size_t i = 0; i < sum.size(); ++i) sum[i] += values[i] / fits_of_gap;
+  };
+  std::ranges::fill(mean.nuisance, 0);
+  for (EffectTerm& term : mean.terms) std::ranges::fill(term.values, 0);
+  for (std::size_t k = 0; k < fits_of_gap; ++k) {
+    const Fit one = fit(*drawn[k], start.nuisance, start.terms, {.count = {}, .refit_nuisances = recalibrated});
+    add(mean.nuisance, one.nuisance);
+    for (std::size_t t = 0; t < mean.terms.size(); ++t) add(mean.terms[t].values, one.terms[t].values);
+  }
+  return mean;
 }
 
 }  // namespace
@@ -82,11 +112,23 @@ double power_left(const Experiment& experiment, const dynamics::NominalValues& t
 GapAsGiven gap_as_given(const TransitionModel& model, const std::vector<double>& nuisance,
                         const std::vector<EffectTerm>& terms) {
   const std::vector<double> given = given_values(model);
-  const double without = model.evaluate(given, {}).total();
-  GapAsGiven gap{2 * (model.evaluate(nuisance, terms).total() - without), {}};
-  for (const EffectTerm& term : terms)
-    gap.alone.push_back(2 *
-                        (fit(model, given, {term}, {.count = {}, .refit_nuisances = false}).log_likelihood - without));
+  const std::vector<double> whole =
+      fit(model, nuisance, terms, {.count = {}, .refit_nuisances = true, .refit_effects = false}).nuisance;
+  std::vector<std::unique_ptr<TransitionModel>> drawn;
+  for (std::uint64_t draw = 1; draw <= draws_of_gap; ++draw) drawn.push_back(model.simulate(whole, terms, draw));
+  const auto mean = [&](const Supposed& one) {
+    double sum = 0;
+    for (const auto& experiment : drawn) sum += 2 * experiment->evaluate(one.nuisance, one.terms).total();
+    return sum / static_cast<double>(drawn.size());
+  };
+  const double truth = mean({whole, terms}), without = mean({given, {}});
+  GapAsGiven gap{truth - without, {}, {}};
+  for (std::size_t e = 0; e < terms.size(); ++e) {
+    std::vector<EffectTerm> others = terms;
+    others.erase(others.begin() + static_cast<std::ptrdiff_t>(e));
+    gap.alone.push_back(mean(best_supposed(drawn, {given, {terms[e]}}, false)) - without);
+    gap.beside.push_back(truth - mean(best_supposed(drawn, {whole, others}, true)));
+  }
   return gap;
 }
 

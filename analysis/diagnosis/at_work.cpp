@@ -178,7 +178,7 @@ std::vector<UnnamedFacet> facets_by_probability(const Chosen& chosen, double p_u
 
 void add_closed_shares(std::vector<AtWork>& at_work, const TransitionModel& model, const CauseRanking& ranking,
                        const RankedCause& best, const Fit& given, const Fit& recalibrated,
-                       const std::vector<double>& gap, const DiagnosisOptions& options,
+                       const std::vector<double>& left, const DiagnosisOptions& options,
                        const std::function<void()>& heartbeat) {
   const auto fit_of = [&](const std::vector<EffectTerm>& terms) -> const Fit* {
     if (terms.empty()) return &recalibrated;
@@ -201,10 +201,8 @@ void add_closed_shares(std::vector<AtWork>& at_work, const TransitionModel& mode
       return std::ranges::find(one.effects, term.candidate->id) != one.effects.end();
     });
     if (own == best.fit.terms.end() || one.probability < options.rules.least_at_work) continue;
-    alone.push_back({});
-    alone.back().nuisance = given.nuisance;
-    alone.back().terms = {*own};
-    alone.back().converged = false;  // it is a start, not a fit
+    if (heartbeat) heartbeat();
+    alone.push_back(fit(model, given.nuisance, {*own}, {.count = {}, .refit_nuisances = false}));
     asked.push_back({&one, parts.size(), parts.size() + 1});
     parts.push_back({&alone.back(), &given, false});
     std::vector<EffectTerm> others = best.fit.terms;
@@ -219,8 +217,8 @@ void add_closed_shares(std::vector<AtWork>& at_work, const TransitionModel& mode
     parts.push_back({&best.fit, without, true});
   }
   if (parts.empty()) return;
-  const std::vector<ClosedShare> closed =
-      parts_closed(model, recalibrated, gap, parts, options.folds, options.threads, options.seed, heartbeat);
+  const std::vector<ClosedShare> closed = parts_closed(model, recalibrated, {&best.fit, &given, left}, parts,
+                                                       options.folds, options.threads, options.seed, heartbeat);
   for (const Asked& one : asked) {
     one.whose->closes_alone = closed[one.alone].estimate();
     one.whose->closes_beside = closed[one.beside].estimate();

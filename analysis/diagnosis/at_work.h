@@ -29,11 +29,11 @@ void join_rivals(std::vector<AtWork>& at_work, const Probabilities& probabilitie
 /// supposed beside, or alone where that is likelier. They share `p_unnamed`.
 std::vector<UnnamedFacet> facets_by_probability(const Chosen& chosen, double p_unnamed, const Rules& rules);
 
-/// Fills in what the effects at work close of the held-out gap as given, added first and last.
-/// @param best  the first hypothesis  @param given  the model as given  @param gap  HeldOutGap::gap
+/// Fills in what the effects at work close of the gap as given, added first and last.
+/// @param best  the first hypothesis  @param given  the model as given  @param left  HeldOutGap::left
 void add_closed_shares(std::vector<AtWork>& at_work, const TransitionModel& model, const CauseRanking& ranking,
                        const RankedCause& best, const Fit& given, const Fit& recalibrated,
-                       const std::vector<double>& gap, const DiagnosisOptions& options,
+                       const std::vector<double>& left, const DiagnosisOptions& options,
                        const std::function<void()>& heartbeat);
 
 }  // namespace metastable::analysis

@@ -454,7 +454,7 @@ Diagnosis answer(const TransitionModel& model, const Fitted& fitted, const std::
   const Fit& cause = *decided.cause;
   if (best && !d.shrinkage.measures.empty() && d.shrinkage.measures.front().closed) {
     add_closed_shares(d.causes.at_work, model, fitted.ranking, *best, fitted.given, fitted.recalibrated,
-                      decided.held_out.gap, options, [&] { progress(0.86, "what each effect closes"); });
+                      decided.held_out.left, options, [&] { progress(0.86, "what each effect closes"); });
     if (d.verdict == Verdict::partly_explained) doubt_effects(d, candidates);
   }
 

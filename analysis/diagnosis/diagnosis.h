@@ -84,9 +84,9 @@ struct AtWork {
   double probability = 0;            ///< that it is, or that one of them is, given all hypotheses
   /// The likeliest effect's parameters, averaged over the hypotheses that hold it; intervals hold what these differ by.
   std::vector<EstimatedParameter> parameters;
-  /// Shares of the held-out gap as given that it closes, 90 %: added to the model as given, nothing else refitted;
-  /// added last, to the recalibrated model with the others at work; and the mean of the two (of two effects Shapley's
-  /// value).
+  /// Shares of the gap as given that it closes, 90 %, without what fitting gains and costs (parts_closed()): added to
+  /// the model as given, nothing else refitted; added last, to the recalibrated model with the others at work; and the
+  /// mean of the two (of two effects Shapley's value).
   std::optional<Estimate> closes_alone, closes_beside, closes_mean;
 };
 

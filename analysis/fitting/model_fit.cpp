@@ -39,14 +39,15 @@ struct Moved {
 // Holds all parameters of a hypothesis in one vector.
 class Point {
  public:
-  Point(const TransitionModel& model, std::vector<double> nuisance, std::vector<EffectTerm> terms, bool with_nuisances,
-        bool last_variant_too = false)
+  Point(const TransitionModel& model, std::vector<double> nuisance, std::vector<EffectTerm> terms,
+        const FitOptions& options)
       : model_(model), nuisance_(std::move(nuisance)), terms_(std::move(terms)) {
-    if (with_nuisances)
+    if (options.refit_nuisances)
       for (std::size_t i = 0; i < nuisance_.size(); ++i) {
         const Nuisance& n = model.nuisances()[i];
         slots_.push_back({&nuisance_[i], n.step, n.step, n.lower, n.upper, n, true});
       }
+    if (!options.refit_effects) return;
     for (EffectTerm& term : terms_)
       for (std::size_t i = 0; i < term.values.size(); ++i) {
         const FreeParameter& p = term.candidate->parameters[i];
@@ -55,7 +56,7 @@ class Point {
         prior.prior_sd = p.prior_sd;
         slots_.push_back({&term.values[i], p.step, p.step, p.lower, p.upper, prior, false});
       }
-    if (!last_variant_too) return;
+    if (!options.last_variant_too) return;
     EffectTerm& last = terms_.back();
     for (std::size_t i = 0; i < last.candidate->refine.size(); ++i)
       if (const double spacing = last.candidate->refine[i]; spacing > 0) {
@@ -339,7 +340,7 @@ Eigen::MatrixXd information(const Derivatives& columns, const Evaluation& here, 
 
 Derivatives derivatives(const TransitionModel& model, const std::vector<double>& nuisance,
                         const std::vector<EffectTerm>& terms, const Evaluation& here, bool with_nuisances) {
-  Point point(model, nuisance, terms, with_nuisances);
+  Point point(model, nuisance, terms, {.count = {}, .refit_nuisances = with_nuisances});
   return differences(model, point, here);
 }
 
@@ -353,7 +354,7 @@ void fill_differences(const Evaluation& here, const Evaluation& there, double st
 }
 
 Fit stepped(const TransitionModel& model, const Fit& near, const std::vector<EffectTerm>& terms) {
-  Point point(model, near.nuisance, terms, true);
+  Point point(model, near.nuisance, terms, {});
   const Eigen::VectorXd weights = event_weights(model, {});
   Fit result;
   result.evaluation = point.evaluate();
@@ -385,7 +386,7 @@ Fit stepped(const TransitionModel& model, const Fit& near, const std::vector<Eff
 
 Fit fit(const TransitionModel& model, const std::vector<double>& nuisance, const std::vector<EffectTerm>& terms,
         const FitOptions& options) {
-  Point point(model, nuisance, terms, options.refit_nuisances, options.last_variant_too);
+  Point point(model, nuisance, terms, options);
   const Eigen::VectorXd weights = event_weights(model, options.count);
   Fit result;
   result.evaluation = options.evaluation ? *options.evaluation : point.evaluate();

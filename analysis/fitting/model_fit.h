@@ -50,6 +50,7 @@ Eigen::MatrixXd resolved_root(const Eigen::MatrixXd& information);
 struct FitOptions {
   std::vector<char> count;  ///< by trial: 0 leaves its events out; empty: all
   bool refit_nuisances = true;
+  bool refit_effects = true;  ///< false: the effects keep the values that they are given
   int most_iterations = 25;
   /// A caller who knows the evaluation at the start, or the derivatives for the first step, spares the fit from finding
   /// them.

@@ -246,7 +246,7 @@ HeldOutGap gap_shrinkage(const TransitionModel& model, const Fit& given, const F
   });
 
   HeldOutGap result;
-  for (const HeldOut& h : held) result.gap.push_back(h.log_score[2] + h.flexible - h.log_score[0] - h.flexible_floor);
+  for (const HeldOut& h : held) result.left.push_back(h.flexible - h.flexible_floor);
   result.measures = held_out_measures(model, held, seed);
   return result;
 }

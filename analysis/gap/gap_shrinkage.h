@@ -46,10 +46,10 @@ struct StepsBeforeFailure {
   std::optional<Estimate> without_unnamed = {};
 };
 
-/// The measures, and what of the first each trial says.
+/// The measures, and what each trial says of what is left.
 struct HeldOutGap {
   std::vector<Shrinkage> measures;
-  std::vector<double> gap;  ///< [trials] log score of the flexible model over that of the model as given [nats]
+  std::vector<double> left;  ///< [trials] log score of the flexible model over the chosen one, less the floor [nats]
 };
 
 /// Cross-validates by trial: in every fold nuisances and each of `rivals` are refitted to the other trials, the rival

@@ -50,18 +50,31 @@ ClosedShare mean_of(const ClosedShare& one, const ClosedShare& other) {
   return mean;
 }
 
-std::vector<ClosedShare> parts_closed(const TransitionModel& model, const Fit& recalibrated,
-                                      const std::vector<double>& gap, const std::vector<GapPart>& parts, int folds,
-                                      int threads, std::uint64_t seed, const std::function<void()>& heartbeat) {
-  using Refitted = std::pair<const Fit*, bool>;
-  std::vector<Refitted> fits;  // each once, with whether its nuisances are refitted
-  for (const GapPart& part : parts)
-    for (const Refitted& one : {Refitted{part.with, part.recalibrated}, Refitted{part.without, part.recalibrated}})
-      if (std::ranges::find(fits, one) == fits.end()) fits.push_back(one);
+namespace {
+
+// A fit, with whether its nuisances are refitted.
+using Refitted = std::pair<const Fit*, bool>;
+
+// Adds what a model says of the events of the trials counted to the sums by trial.
+void add_scores(const TransitionModel& model, const Evaluation& evaluation, double weight,
+                const std::function<bool(std::size_t trial)>& counts, std::vector<double>& score) {
+  for (std::size_t i = 0; i < model.events().size(); ++i)
+    if (const std::size_t trial = model.events()[i].trial; counts(trial))
+      score[trial] += weight * evaluation.log_density[i];
+}
+
+// Returns [fits][trials] log scores without what fitting gains or costs. To first order p parameters gain p / 2 on the
+// trials that they are fitted to, and lose p / 2 k / (k - 1) on those that k folds hold out.
+std::vector<std::vector<double>> unbiased_scores(const TransitionModel& model, const Fit& recalibrated,
+                                                 const std::vector<Refitted>& fits, int folds, int threads,
+                                                 std::uint64_t seed, const std::function<void()>& beat) {
   const std::size_t trials = model.trials();
   const std::vector<int> fold = folds_of_trials(trials, folds, seed);
+  const double fitted_share = folds / (2.0 * folds - 1);
   std::vector<std::vector<double>> score(fits.size(), std::vector<double>(trials));
-  const std::function<void()> beat = markov::one_at_a_time(heartbeat);
+  for (std::size_t k = 0; k < fits.size(); ++k)
+    add_scores(
+        model, fits[k].first->evaluation, fitted_share, [](std::size_t) { return true; }, score[k]);
   model.side_by_side(fits.size() * static_cast<std::size_t>(folds), threads, [&](std::size_t task) {
     beat();
     const std::size_t k = task / static_cast<std::size_t>(folds);
@@ -72,25 +85,39 @@ std::vector<ClosedShare> parts_closed(const TransitionModel& model, const Fit& r
     options.refit_nuisances = fits[k].second;
     const bool nothing_free = !fits[k].second && fits[k].first->terms.empty();
     const Fit fitted = nothing_free ? *fits[k].first : fit_from(*fits[k].first, model, recalibrated, options);
-    for (std::size_t i = 0; i < model.events().size(); ++i) {
-      const std::size_t trial = model.events()[i].trial;
-      if (fold[trial] == f) score[k][trial] += fitted.evaluation.log_density[i];
-    }
+    add_scores(
+        model, fitted.evaluation, 1 - fitted_share, [&](std::size_t t) { return fold[t] == f; }, score[k]);
   });
-  const auto of = [&](const Fit* one, bool refitted) {
-    return static_cast<std::size_t>(std::ranges::find(fits, Refitted{one, refitted}) - fits.begin());
+  return score;
+}
+
+}  // namespace
+
+std::vector<ClosedShare> parts_closed(const TransitionModel& model, const Fit& recalibrated, const WholeGap& gap,
+                                      const std::vector<GapPart>& parts, int folds, int threads, std::uint64_t seed,
+                                      const std::function<void()>& heartbeat) {
+  std::vector<Refitted> fits{{gap.best, true}, {gap.given, false}};  // each once
+  for (const GapPart& part : parts)
+    for (const Refitted& one : {Refitted{part.with, part.recalibrated}, Refitted{part.without, part.recalibrated}})
+      if (std::ranges::find(fits, one) == fits.end()) fits.push_back(one);
+  const std::vector<std::vector<double>> scores =
+      unbiased_scores(model, recalibrated, fits, folds, threads, seed, markov::one_at_a_time(heartbeat));
+  const auto score = [&](const Fit* one, bool refitted) -> const std::vector<double>& {
+    return scores[static_cast<std::size_t>(std::ranges::find(fits, Refitted{one, refitted}) - fits.begin())];
   };
+  const std::vector<double>&best = score(gap.best, true), &given = score(gap.given, false);
   std::vector<ClosedShare> closed;
   for (const GapPart& part : parts) {
-    const std::vector<double>& with = score[of(part.with, part.recalibrated)];
-    const std::vector<double>& without = score[of(part.without, part.recalibrated)];
+    const std::vector<double>& with = score(part.with, part.recalibrated);
+    const std::vector<double>& without = score(part.without, part.recalibrated);
     const auto share = [&](auto weight_of) {
-      double closes = 0, all = 0;
-      for (std::size_t t = 0; t < trials; ++t) {
+      double closes = 0, all = 0, left = 0;
+      for (std::size_t t = 0; t < model.trials(); ++t) {
         closes += weight_of(t) * (with[t] - without[t]);
-        all += weight_of(t) * gap[t];
+        all += weight_of(t) * (best[t] - given[t]);
+        left += weight_of(t) * gap.left[t];
       }
-      return closes / all;
+      return closes / (all + std::max(0.0, left));
     };
     ClosedShare& one = closed.emplace_back(ClosedShare{share([](std::size_t) { return 1.0; }), {}});
     for (std::uint64_t draw = 0; draw < closing_draws; ++draw)

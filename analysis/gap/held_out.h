@@ -33,12 +33,20 @@ struct ClosedShare {
   friend ClosedShare mean_of(const ClosedShare& one, const ClosedShare& other);
 };
 
-/// Says what share of the held-out gap lies between the two models of each part, in log score, each refitted in every
-/// fold, by a bootstrap of 400 draws.
-/// @param gap  [trials] HeldOutGap::gap, of the same folds and seed
+/// A gap as given, of which parts are asked: from the model as given to the best one, and what that leaves.
+struct WholeGap {
+  const Fit *best = nullptr, *given = nullptr;  ///< fitted with its nuisances; with nothing fitted
+  const std::vector<double>& left;              ///< HeldOutGap::left
+};
+
+/// Says what share of the gap lies between the two models of each part, in log score, by a bootstrap of 400 draws. What
+/// a model says of a trial is the mean of what it says where the trial is fitted and where it is held out, each model
+/// refitted in every fold, weighted so that what fitting gains by chance and what it costs cancel. Without that a model
+/// of more parameters would close less the fewer trials there are. What is left counts for nothing where it is less.
+/// @param parts  of fits to all trials
 /// @param heartbeat  called before every fit, from any thread, one at a time; may throw to stop
-std::vector<ClosedShare> parts_closed(const TransitionModel& model, const Fit& recalibrated,
-                                      const std::vector<double>& gap, const std::vector<GapPart>& parts, int folds,
-                                      int threads, std::uint64_t seed, const std::function<void()>& heartbeat = {});
+std::vector<ClosedShare> parts_closed(const TransitionModel& model, const Fit& recalibrated, const WholeGap& gap,
+                                      const std::vector<GapPart>& parts, int folds, int threads, std::uint64_t seed,
+                                      const std::function<void()>& heartbeat = {});
 
 }  // namespace metastable::analysis

@@ -200,8 +200,7 @@ TEST(BlindGrade, ExpectedSteps) {
 // its own.
 TEST(BlindGrade, SharesThatEffectsClose) {
   BlindTruth pair = truth(BlindKind::pair, {"bounce", "inertia"}, 2);
-  pair.gap_as_given = GapAsGiven{300, {100, 250}};
-  pair.left_by_effect = {50, 200};
+  pair.gap_as_given = GapAsGiven{300, {100, 250}, {50, 200}};
   BlindAnswer one = said(Verdict::explained, {"bounce+inertia"}), group = one, doubted = one;
   one.at_work = {{{"bounce"}, 0.9, std::pair{0.3, 0.35}, std::pair{0.2, 0.3}},
                  {{"inertia"}, 1, std::pair{0.8, 0.9}, std::nullopt},
