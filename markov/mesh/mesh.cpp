@@ -76,8 +76,11 @@ Mesh::Corners Mesh::corners(int phase, std::span<const double> state) const {
 
 void Mesh::apply_left(std::span<const double> x, std::span<double> y) const {
   std::fill(y.begin(), y.end(), 0.0);
-  for (std::size_t i = 0; i < size(); ++i)
-    for (std::size_t e = row_start_[i]; e < row_start_[i + 1]; ++e) y[column_[e]] += x[i] * value_[e];
+  for (std::size_t i = 0; i < size(); ++i) {
+    const double mass = x[i];
+    if (mass == 0) continue;  // Survivors have not come everywhere yet.
+    for (std::size_t e = row_start_[i]; e < row_start_[i + 1]; ++e) y[column_[e]] += mass * value_[e];
+  }
 }
 
 void Mesh::apply(std::span<const double> x, std::span<double> y) const {

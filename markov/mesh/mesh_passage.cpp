@@ -80,7 +80,7 @@ double mixing_steps_of(const std::vector<double>& distances, int phases) {
 
 }  // namespace
 
-MeshPassage follow_survivors(const MassRows& rows, std::vector<double> x, double settled_change, int most_products,
+MeshPassage follow_survivors(const MassRows& rows, std::vector<double> x, double still_to_come, int most_products,
                              bool or_stop) {
   const std::size_t n = rows.kill.size();
   MeshPassage passage;
@@ -109,8 +109,10 @@ MeshPassage follow_survivors(const MassRows& rows, std::vector<double> x, double
       return passage;
     }
     distances.push_back(total(rows, {distance_of(x, before), 0})[0]);
-    const bool still =
-        std::abs(turn.failures - last_failures) <= settled_change * turn.failures && distances.back() <= still_distance;
+    // Changes fall as distances do: what is to come is the last one times the revolutions that mixing takes.
+    const double to_come =
+        std::abs(turn.failures - last_failures) * std::max(1.0, mixing_steps_of(distances, rows.phases) / rows.phases);
+    const bool still = to_come <= still_to_come * turn.failures && distances.back() <= still_distance;
     settled = still ? settled + 1 : 0;
     if (or_stop && passage.products >= most_products && settled < in_a_row) {
       passage.settled = false;
@@ -135,7 +137,7 @@ MeshPassage follow_survivors(const MassRows& rows, std::vector<double> x, double
   return passage;
 }
 
-MeshPassage mesh_passage(const Mesh& mesh, std::span<const double> start, double settled_change, int most_products,
+MeshPassage mesh_passage(const Mesh& mesh, std::span<const double> start, double still_to_come, int most_products,
                          bool or_stop, int revolutions) {
   std::vector<double> x(mesh.size(), 0.0);
   const Mesh::Corners corners = mesh.corners(0, start);
@@ -143,7 +145,7 @@ MeshPassage mesh_passage(const Mesh& mesh, std::span<const double> start, double
     x[corners.node[static_cast<std::size_t>(c)]] += corners.weight[static_cast<std::size_t>(c)];
   MeshPassage passage = follow_survivors(
       {mesh.phases() * revolutions, mesh.kill(), mesh.leave(), [&](auto from, auto to) { mesh.apply_left(from, to); }},
-      std::move(x), settled_change, most_products, or_stop);
+      std::move(x), still_to_come, most_products, or_stop);
   for (double& share : passage.distribution) share /= revolutions;
   return passage;
 }

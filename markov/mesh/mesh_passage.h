@@ -32,16 +32,16 @@ struct MassRows {
 };
 
 /// Follows the distribution of survivors, from one over the nodes of phase 0 (`start`, own nodes), until it keeps its
-/// form: until the failures of a revolution change by no more than `settled_change` of themselves, three times running.
-/// Survivors that do not within `most_products` are an error, or are followed no further if `or_stop`: they then fail
-/// on as they last did.
+/// form: until the failures of a revolution will change by no more than `still_to_come` of themselves, as they fall,
+/// three times running. Survivors that do not within `most_products` are an error, or are followed no further if
+/// `or_stop`: they then fail on as they last did.
 /// @throws ConvergenceError in the first case
-MeshPassage follow_survivors(const MassRows& rows, std::vector<double> start, double settled_change = 1e-9,
+MeshPassage follow_survivors(const MassRows& rows, std::vector<double> start, double still_to_come = 1e-6,
                              int most_products = 20000, bool or_stop = false);
 
 /// Does the same from a state at phase 0 of one mesh.
 /// @param revolutions  of the mesh that count as one, as where survivors come back in turns only
-MeshPassage mesh_passage(const Mesh& mesh, std::span<const double> start, double settled_change = 1e-9,
+MeshPassage mesh_passage(const Mesh& mesh, std::span<const double> start, double still_to_come = 1e-6,
                          int most_products = 20000, bool or_stop = false, int revolutions = 1);
 
 /// Returns u[n][i], n = 0 .. window: the probability that a walker at node i fails in exactly its (n+1)-th step.

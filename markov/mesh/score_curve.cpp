@@ -18,8 +18,10 @@ constexpr double foretold = 2e-3;       // stationary sds: what a gap's middle m
                                         // afterwards a sixty-fourth is left
 constexpr double extrapolated = 10;     // times that, where a polynomial had to look beyond its places
 constexpr int foreseen = 2;             // further halvings of a gap that a dear map is asked for ahead
-constexpr double per_cell = 2,
-                 pair_limit = 1024;  // pairs of Gauss's points a cell of the lattice, and between two places
+// Pairs of Gauss's points a cell of the lattice, by dimension: the intervals of one and two dimensions are narrow
+// enough to show what fewer leave.
+constexpr std::array<double, 4> per_cell{2, 2, 1.5, 1.5};
+constexpr double pair_limit = 1024;  // such pairs between two places
 
 using Point = NodeLattice::Point;
 
@@ -68,6 +70,7 @@ class Sharing {
   Sharing(const NodeLattice& lattice, int phase, double weight, std::vector<std::pair<std::uint64_t, double>>& parts)
       : lattice_(lattice), phase_(phase), weight_(weight), dimension_(lattice.dimension()), parts_(parts) {}
   ~Sharing() { flush(); }
+  double pairs_per_cell() const { return per_cell[dimension_ - 1]; }
   Sharing(const Sharing&) = delete;
   Sharing& operator=(const Sharing&) = delete;
 
@@ -126,7 +129,8 @@ class Sharing {
 void share_along(const PlacePolynomial& curve, double low, double high, double cells, Sharing& sharing) {
   const double mass = normal_mass(low, high);
   if (!(mass > 0)) return;
-  const double pairs = std::clamp(std::ceil(cells * per_cell), 1.0, pair_limit), width = (high - low) / pairs;
+  const double pairs = std::clamp(std::ceil(cells * sharing.pairs_per_cell()), 1.0, pair_limit),
+               width = (high - low) / pairs;
   const double aside = 0.5 / std::numbers::sqrt3;  // Gauss's two points of (-1/2, 1/2)
   std::array<double, 2 * static_cast<std::size_t>(pair_limit)> density;
   double sum = 0;

@@ -59,7 +59,7 @@ TEST(Mesh, RowsAreProbabilitiesWithTheLandingsMean) {
 TEST(Mesh, PassageIsWhatEliminationSaysOfItsChain) {
   for (const double sd : {1.0, 0.45, 0.3}) {  // 1e1 to 4e8 steps
     const Mesh mesh = linear_mesh(sd, 0.3);
-    const MeshPassage passage = mesh_passage(mesh, middle);
+    const MeshPassage passage = mesh_passage(mesh, middle, 1e-9);
     const ChainSolver solver(mesh.chain());
     const std::vector<double> mean = mean_first_passage(solver);
     const auto corners = mesh.corners(0, middle);
