@@ -120,8 +120,10 @@ struct TwoGaits {
     };
     return map;
   }
-  /// Returns the expected steps from -1: fine cells, their probabilities from tails, eliminated.
-  double steps(std::size_t cells = 700) const {
+  /// Returns the expected steps from -1: those on ever finer cells, whose error falls with the square of their width.
+  double steps() const { return (4 * steps_on(700) - steps_on(350)) / 3; }
+  /// Returns them on so many cells, whose probabilities are those of tails, by elimination.
+  double steps_on(std::size_t cells) const {
     const double low = -1 - far, top = high + 14 * sd, width = (top - low) / static_cast<double>(cells);
     const auto mass = [](double a, double b) {
       const auto tail = [](double z) { return 0.5 * std::erfc(z / std::sqrt(2)); };
