@@ -53,6 +53,9 @@ struct BoundedQuasiStationary {
   /// Proven bound of the total variation between the distribution and the true one: half of the sum of absolute
   /// differences, below 1; infinite where there is none. bound_distribution() finds it.
   double distribution_error = std::numeric_limits<double>::infinity();
+  /// Proven bound of the relative error of every entry of the survival weight, whose largest is 1; infinite where there
+  /// is none. bound_distribution() finds it.
+  double weight_error = std::numeric_limits<double>::infinity();
   std::string unproven;  ///< says why there is no bound of the distribution; empty where there is one
 };
 /// Bounds the failure rate by a vector: (w - Q w) / w on the states where w > 0. Bounds that are there already stay

@@ -272,6 +272,56 @@ void take(const Proven& proven, const Row& y, BoundedQuasiStationary& found) {
   found.rate_upper = std::min(found.rate_upper, static_cast<double>(high) * (1 + wide_of_it));
 }
 
+/// Holds psi with ((G - rate) psi)_i >= w_i in all states but the most visited one, where psi is zero.
+Row return_weight(const Chain& chain, WithoutState& solver, std::uint32_t state, const Row& w, Extended rate) {
+  Row psi = solver.solve(w);
+  psi[state] = 0;
+  Extended least = unbounded;
+  for (std::size_t i = 0; i < w.size(); ++i) {
+    if (i == state) continue;
+    const Rounded one = image(chain, psi, rate, i);
+    least = std::min(least, psi[i] > 0 && std::isfinite(psi[i]) ? (one.value - one.error) / w[i] : -1);
+  }
+  if (!(least > 0)) return {};
+  for (Extended& entry : psi) entry = entry / least * (1 + sums);
+  return psi;
+}
+
+/// Bounds the survival weight. With e = w - a u, u the true one and a such that e is zero in the most visited state,
+/// |((G - rate) w)_i| <= off first_i in the others bounds |e_i| by off psi_i.
+void bound_weight(const Chain& chain, const Row& first, WithoutState& solver, std::uint32_t state,
+                  BoundedQuasiStationary& found, const Heard& heard) {
+  if (std::ranges::any_of(first, [](Extended weight) { return !(weight > 0); })) return;
+  const Row psi = return_weight(chain, solver, state, first, found.rate_upper);
+  if (psi.empty()) return;
+  const Extended shift = (static_cast<Extended>(found.rate_lower) + found.rate_upper) / 2,
+                 rate_off = found.rate_upper - shift + extended_unit;
+  Row w = first;
+  for (int corrected = 0; corrected <= most_corrections; ++corrected) {
+    if (heard) heard();
+    Row residual(w.size(), 0);
+    Extended off = 0, reached = 0, apart = 0;
+    const Extended largest = *std::max_element(w.begin(), w.end());
+    for (std::size_t i = 0; i < w.size(); ++i) {
+      const Rounded one = image(chain, w, shift, i);
+      if (i != state) off = std::max(off, (std::abs(one.value) + one.error + rate_off * w[i]) / first[i]);
+      residual[i] = one.value;
+      reached = std::max(reached, psi[i] / w[i]);
+      apart = std::max(apart, std::abs(found.quasi.survival_weight[i] * largest / w[i] - 1));
+    }
+    const Extended relative = off * reached * (1 + sums);
+    if (!(relative < 0.5L)) return;
+    // The largest weight is 1, so that its own error comes to that of each entry.
+    const auto error = static_cast<double>((1 + relative) / (1 - relative) * (1 + apart) - 1) * (1 + wide_of_it);
+    const bool settled = !(error < found.weight_error / 2);
+    found.weight_error = std::min(found.weight_error, error);
+    if (settled) return;
+    const Row correction = solver.solve(residual);
+    for (std::size_t i = 0; i < w.size(); ++i) w[i] -= correction[i];
+    if (std::ranges::any_of(w, [](Extended weight) { return !(weight > 0); })) return;
+  }
+}
+
 void bounded_by_returns(const Chain& chain, std::span<const Extended> left, std::span<const Extended> right, Way way,
                         std::uint32_t state, BoundedQuasiStationary& found, const Heard& heard) {
   const Row scale = scale_of(generator_of(chain), right, heard), weight(right.begin(), right.end());
@@ -284,25 +334,26 @@ void bounded_by_returns(const Chain& chain, std::span<const Extended> left, std:
     const Proven proven = proven_of(chain, y, weight, reach, state, found);
     const double before = found.distribution_error;
     take(proven, y, found);
-    if (corrected == most_corrections || found.distribution_error > before / 2) return;
+    if (corrected == most_corrections || found.distribution_error > before / 2) break;
     Row off;
     for (const Rounded& one : left_image(chain, y, proven.shift)) off.push_back(one.value);
     const Row correction = solver.solve_left(off);
     for (std::size_t i = 0; i < y.size(); ++i) y[i] = std::max<Extended>(0, y[i] - correction[i]);
   }
+  bound_weight(chain, weight, solver, state, found, heard);
 }
 
 }  // namespace
 
 void bound_distribution(const Chain& chain, std::span<const Extended> left, std::span<const Extended> right, Way way,
                         BoundedQuasiStationary& found, const Heard& heard) {
-  found.distribution_error = std::numeric_limits<double>::infinity();
+  found.distribution_error = found.weight_error = std::numeric_limits<double>::infinity();
   if (found.quasi.failure_rate == 1) {
     found.unproven = "no state is visited twice: what the last survivors look like depends on the start";
     return;
   }
   if (chain.size() == 1) {  // there is one distribution
-    found.distribution_error = 0;
+    found.distribution_error = found.weight_error = 0;
     found.unproven.clear();
     return;
   }

@@ -159,6 +159,7 @@ py::dict quasi_stationary(HeldChain& held, const py::object& progress) {
   told["upper"] = found.rate_upper;
   told["distribution_error"] =
       std::isfinite(found.distribution_error) ? py::cast(found.distribution_error) : py::none();
+  told["weight_error"] = std::isfinite(found.weight_error) ? py::cast(found.weight_error) : py::none();
   told["unproven"] = found.unproven.empty() ? py::none() : py::cast(found.unproven);
   told["residual"] = found.quasi.residual;
   told["iterations"] = found.quasi.iterations;

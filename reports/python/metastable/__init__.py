@@ -775,15 +775,16 @@ class QuasiStationary(_ByState):
     unless there is a `distribution_error`: a proven bound of the total variation (half of the sum of absolute
     differences) between the distribution and the true one of the chain as given. It is None where groups of states change
     places too rarely to prove one below 1, or no state is visited twice; `unproven` says why then, and is None otherwise.
-    The weight is an estimate, without a proven bound: `residual` is the largest of |y Q - lambda y| and
+    `weight_error` is a proven bound of the relative error of every entry of the survival weight, None where there is
+    none. `residual` is the largest of |y Q - lambda y| and
     |Q x - lambda x|, entry by entry, relative to the entry times the probability of leaving its state, and of the error
     that may be left along other eigenvectors; `iterations` says how long it took."""
 
-    def __init__(self, distribution, survival_weight, failure_rate, lower, upper, distribution_error, unproven, residual,
-                 iterations):
+    def __init__(self, distribution, survival_weight, failure_rate, lower, upper, distribution_error, weight_error,
+                 unproven, residual, iterations):
         super().__init__(dict(distribution=distribution, survival_weight=survival_weight, failure_rate=failure_rate,
-                              lower=lower, upper=upper, distribution_error=distribution_error, unproven=unproven,
-                              residual=residual, iterations=iterations))
+                              lower=lower, upper=upper, distribution_error=distribution_error,
+                              weight_error=weight_error, unproven=unproven, residual=residual, iterations=iterations))
 
     def __repr__(self):
         return f"<metastable.QuasiStationary: failure rate {self.failure_rate:.6g} per step>"
@@ -896,8 +897,8 @@ def chain(matrix, kill, *, memory_gb=2, time_limit=900, threads=0):
     A chain whose elimination takes a second or two (a full one of 3000 states, a band of 200 around the diagonal of 1e5)
     is eliminated without a subtraction: full relative accuracy however rare failures are. Others are solved by iteration.
     Of these, mean and sd of the steps, failure rate and committor are refused with a ComputationError where they cannot be
-    proven to 1e-6, relative. Distribution, survival weight and survival are not proven: the first two are refused where
-    their residual is above 1e-8, and survival far ahead where survivors settle too slowly.
+    proven to 1e-6, relative. Distribution and survival weight come with proven bounds, or with none; they are refused
+    where their residual is above 1e-8, and survival far ahead where survivors settle too slowly.
 
     Both hold real numbers; complex ones, masked arrays, text and missing numbers are refused.
     """

@@ -401,12 +401,13 @@ class QuasiStationary(Record):
     lower: float
     upper: float
     distribution_error: Optional[float]
+    weight_error: Optional[float]
     unproven: Optional[str]
     residual: float
     iterations: int
     def __init__(self, distribution: Floats, survival_weight: Floats, failure_rate: float, lower: float, upper: float,
-                 distribution_error: Optional[float], unproven: Optional[str], residual: float,
-                 iterations: int) -> None: ...
+                 distribution_error: Optional[float], weight_error: Optional[float], unproven: Optional[str],
+                 residual: float, iterations: int) -> None: ...
 
 
 class Passage(Record):

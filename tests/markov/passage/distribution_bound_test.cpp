@@ -5,6 +5,7 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 #include <random>
 
@@ -17,16 +18,14 @@ namespace {
 
 using reference::Long;
 
-/// Returns the left vector of the smallest eigenvalue of I - Q, sum one, to 50 digits.
-std::vector<Long> exact_distribution(const Chain& chain) {
-  const auto matrix = reference::generator<Long>(chain);
-  const std::size_t n = chain.size();
-  auto transposed = matrix;
-  for (std::size_t i = 0; i < n; ++i)
-    for (std::size_t j = 0; j < n; ++j) transposed[i][j] = matrix[j][i];
+using LongMatrix = std::vector<std::vector<Long>>;
+
+/// Returns the right vector of the smallest eigenvalue of a matrix, sum one, to 50 digits.
+std::vector<Long> exact_vector(const LongMatrix& matrix) {
+  const std::size_t n = matrix.size();
   std::vector<Long> y(n, Long(1) / n);
   for (int iteration = 0; iteration < 4000; ++iteration) {
-    std::vector<Long> next = reference::gauss(transposed, y);
+    std::vector<Long> next = reference::gauss(matrix, y);
     Long sum = 0, change = 0;
     for (const Long& entry : next) sum += entry;
     for (std::size_t i = 0; i < n; ++i) {
@@ -37,6 +36,24 @@ std::vector<Long> exact_distribution(const Chain& chain) {
     if (change < Long(1e-55)) break;
   }
   return y;
+}
+
+std::vector<Long> exact_distribution(const Chain& chain) {
+  const LongMatrix matrix = reference::generator<Long>(chain);
+  LongMatrix transposed = matrix;
+  for (std::size_t i = 0; i < matrix.size(); ++i)
+    for (std::size_t j = 0; j < matrix.size(); ++j) transposed[i][j] = matrix[j][i];
+  return exact_vector(transposed);
+}
+
+/// Returns the largest relative error of the weights.
+double true_weight_error(const BoundedQuasiStationary& found, const Chain& chain) {
+  const std::vector<Long> exact = exact_vector(reference::generator<Long>(chain));
+  const Long largest = *std::max_element(exact.begin(), exact.end());
+  Long most = 0;
+  for (std::size_t i = 0; i < exact.size(); ++i)
+    most = std::max(most, Long(abs(Long(found.quasi.survival_weight[i]) * largest / exact[i] - 1)));
+  return most.convert_to<double>();
 }
 
 double true_error(const BoundedQuasiStationary& found, const std::vector<Long>& exact) {
@@ -76,6 +93,12 @@ void expect_held(const Chain& chain, double useful, const std::string& name) {
     EXPECT_LE(true_error(found, exact), found.distribution_error) << name;
     EXPECT_LE(found.distribution_error, useful) << name << " " << found.unproven;
     EXPECT_EQ(found.unproven.empty(), std::isfinite(found.distribution_error)) << name;
+    EXPECT_LE(true_weight_error(found, chain), found.weight_error) << name;
+    if (*std::min_element(found.quasi.survival_weight.begin(), found.quasi.survival_weight.end()) > 0) {
+      EXPECT_LE(found.weight_error, std::max(1e-12, useful * static_cast<double>(chain.size()))) << name;
+    } else {
+      EXPECT_EQ(found.weight_error, HUGE_VAL) << name;
+    }
     EXPECT_LE(Long(found.rate_lower), rate) << name;
     EXPECT_GE(Long(found.rate_upper), rate) << name;
   }

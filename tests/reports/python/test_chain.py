@@ -41,6 +41,10 @@ class Chains(unittest.TestCase):
         left = np.abs(vectors[:, values.real.argmax()].real)
         np.testing.assert_allclose(quasi.distribution, left / left.sum(), rtol=1e-9)
         self.assertLess(quasi.distribution_error, 1e-13)
+        right = np.linalg.eig(matrix)
+        right = np.abs(right[1][:, right[0].real.argmax()].real)
+        np.testing.assert_allclose(quasi.survival_weight, right / right.max(), rtol=1e-9)
+        self.assertLess(quasi.weight_error, 1e-13)
         self.assertIsNone(quasi.unproven)
         np.testing.assert_allclose(chain.survival(3, [0, 1, 7]),
                                    [np.linalg.matrix_power(matrix, k)[3].sum() for k in (0, 1, 7)], rtol=1e-10)
@@ -120,6 +124,7 @@ class Chains(unittest.TestCase):
         self.assertTrue(1e-15 < quasi.distribution_error < 1e-6)
         passing = metastable.chain([[0, .5], [0, 0]], [.5, 1]).quasi_stationary()
         self.assertIsNone(passing.distribution_error)
+        self.assertIsNone(passing.weight_error)
         self.assertRegex(passing.unproven, "no state is visited twice")
 
     def test_what_is_not_unique_is_said(self):
