@@ -69,13 +69,19 @@ double distance_of(const std::vector<double>& x, const std::vector<double>& befo
 }
 
 // Returns in how many steps the distance from the quasi-stationary distribution falls by a factor of e; 0 where it does
-// not fall. It falls by |lambda_2 / lambda_1| a step, oscillating: its decline over the second half tells.
+// not fall. It falls by |lambda_2 / lambda_1| a step, oscillating: a line through the logarithms of its second half
+// tells.
 // @param distances  between distributions a revolution apart
 double mixing_steps_of(const std::vector<double>& distances, int phases) {
   const std::size_t last = distances.size() - 1, first = last / 2;
   if (!(distances[last] > 0 && distances[first] > distances[last])) return 0;
-  return static_cast<double>((last - first) * static_cast<std::size_t>(phases)) /
-         std::log(distances[first] / distances[last]);
+  const double middle = 0.5 * static_cast<double>(first + last);
+  double fall = 0, squares = 0;
+  for (std::size_t k = first; k <= last; ++k) {
+    fall -= (static_cast<double>(k) - middle) * std::log(distances[k]);
+    squares += (static_cast<double>(k) - middle) * (static_cast<double>(k) - middle);
+  }
+  return fall > 0 ? static_cast<double>(phases) * squares / fall : 0;
 }
 
 }  // namespace
