@@ -8,8 +8,8 @@
 #include <utility>
 
 #include "analysis/diagnosis/diagnosis_sentences.h"
+#include "analysis/diagnosis/fits_without.h"
 #include "analysis/fitting/cause_ranking.h"
-#include "analysis/fitting/effect_fit.h"
 #include "analysis/gap/held_out.h"
 #include "analysis/statistics/interval_95.h"
 
@@ -176,17 +176,9 @@ std::vector<UnnamedFacet> facets_by_probability(const Chosen& chosen, double p_u
   return all;
 }
 
-void add_closed_shares(std::vector<AtWork>& at_work, const TransitionModel& model, const CauseRanking& ranking,
-                       const RankedCause& best, const Fit& given, const Fit& recalibrated,
-                       const std::vector<double>& left, const DiagnosisOptions& options,
-                       const std::function<void()>& heartbeat) {
-  const auto fit_of = [&](const std::vector<EffectTerm>& terms) -> const Fit* {
-    if (terms.empty()) return &recalibrated;
-    for (const auto* causes : {&ranking.singles, &ranking.pairs, &ranking.sets})
-      for (const RankedCause& one : *causes)
-        if (one.fitted() && one.terms.size() == terms.size() && extends(one.terms, terms)) return &one.fit;
-    return nullptr;
-  };
+void add_closed_shares(std::vector<AtWork>& at_work, const TransitionModel& model, const RankedCause& best,
+                       FitsWithout& without, const Fit& given, const Fit& recalibrated, const std::vector<double>& left,
+                       const DiagnosisOptions& options, const std::function<void()>& heartbeat) {
   struct Asked {
     AtWork* whose;
     std::size_t alone;
@@ -195,7 +187,6 @@ void add_closed_shares(std::vector<AtWork>& at_work, const TransitionModel& mode
   std::vector<GapPart> parts;
   std::vector<Asked> asked;
   std::deque<Fit> alone;  // the effect in the model as given
-  std::deque<Fit> rest;   // sets without one effect that the search did not fit
   for (AtWork& one : at_work) {
     const auto own = std::ranges::find_if(best.fit.terms, [&](const EffectTerm& term) {
       return std::ranges::find(one.effects, term.candidate->id) != one.effects.end();
@@ -205,16 +196,8 @@ void add_closed_shares(std::vector<AtWork>& at_work, const TransitionModel& mode
     alone.push_back(fit(model, given.nuisance, {*own}, {.count = {}, .refit_nuisances = false}));
     asked.push_back({&one, parts.size(), parts.size() + 1});
     parts.push_back({&alone.back(), &given, false});
-    std::vector<EffectTerm> others = best.fit.terms;
-    std::erase_if(others, [&](const EffectTerm& term) { return term.candidate == own->candidate; });
-    const Fit* without = fit_of(others);
-    if (!without) {
-      if (heartbeat) heartbeat();
-      without = &rest.emplace_back(fit(
-          model, best.fit.nuisance, others,
-          {.count = {}, .refit_nuisances = true, .most_iterations = effort_for(model, recalibrated).most_iterations}));
-    }
-    parts.push_back({&best.fit, without, true});
+    const auto place = static_cast<std::size_t>(own - best.fit.terms.begin());
+    parts.push_back({&best.fit, &without.term(place, heartbeat), true});
   }
   if (parts.empty()) return;
   const std::vector<ClosedShare> closed = parts_closed(model, recalibrated, {&best.fit, &given, left}, parts,

@@ -11,6 +11,8 @@
 
 namespace metastable::analysis {
 
+class FitsWithout;
+
 /// Lists the effects of the likeliest hypotheses by their probability of being at work, each over all hypotheses that
 /// hold it, with or without something unnamed; where none of the effects that act alike is at work by itself they are
 /// one group, and so are effects of one of `groups` that stand in each other's place.
@@ -30,10 +32,10 @@ void join_rivals(std::vector<AtWork>& at_work, const Probabilities& probabilitie
 std::vector<UnnamedFacet> facets_by_probability(const Chosen& chosen, double p_unnamed, const Rules& rules);
 
 /// Fills in what the effects at work close of the gap as given, added first and last.
-/// @param best  the first hypothesis  @param given  the model as given  @param left  HeldOutGap::left
-void add_closed_shares(std::vector<AtWork>& at_work, const TransitionModel& model, const CauseRanking& ranking,
-                       const RankedCause& best, const Fit& given, const Fit& recalibrated,
-                       const std::vector<double>& left, const DiagnosisOptions& options,
-                       const std::function<void()>& heartbeat);
+/// @param best  the first hypothesis  @param without  its fits without each effect  @param given  the model as given
+/// @param left  HeldOutGap::left
+void add_closed_shares(std::vector<AtWork>& at_work, const TransitionModel& model, const RankedCause& best,
+                       FitsWithout& without, const Fit& given, const Fit& recalibrated, const std::vector<double>& left,
+                       const DiagnosisOptions& options, const std::function<void()>& heartbeat);
 
 }  // namespace metastable::analysis

@@ -12,16 +12,15 @@
 namespace metastable::analysis {
 namespace {
 
-// Returns the places of the variations that say most: beside the hypothesis, by its scores, and at the recalibrated
-// model.
-std::vector<std::size_t> leading_variations(const TransitionModel& model, const EffectScan& scan,
-                                            const std::vector<LeftInFacet>& alone, const Rules& rules) {
-  std::vector<std::size_t> leading;
-  const auto best = std::ranges::max_element(
-      scan.effects, {}, [&](const ScannedEffect& one) { return evidence_of(one, one.gain[one.best], rules); });
-  leading.push_back(static_cast<std::size_t>(best - scan.effects.begin()));
+// The first saves time, the other is an overflow's.
+constexpr double least_odds = 0.05;             // of a variation in an effect's place, that are followed
+constexpr double largest_odds_in_place = 1e12;  // that are told
+
+// Returns the place of the variation that says most by itself, by the facets it was weighed in; nothing where it was
+// none.
+std::optional<std::size_t> strongest_alone(const TransitionModel& model, const std::vector<LeftInFacet>& alone) {
   const LeftInFacet* most = nullptr;
-  std::size_t place = 0;
+  std::optional<std::size_t> place;
   for (std::size_t i = 0; i < model.variations().size(); ++i)
     for (const LeftInFacet& left : alone)
       if (left.facet == model.variations()[i].facet && left.aspect == model.variations()[i].aspect &&
@@ -29,49 +28,136 @@ std::vector<std::size_t> leading_variations(const TransitionModel& model, const 
         most = &left;
         place = i;
       }
-  if (most && place != leading.front()) leading.push_back(place);
+  return place;
+}
+
+// Returns the places of the variations that say most: beside the hypothesis, by its scores, and at the recalibrated
+// model.
+std::vector<std::size_t> leading_variations(const TransitionModel& model, const EffectScan& scan,
+                                            const std::vector<LeftInFacet>& alone, const Rules& rules) {
+  const auto best = std::ranges::max_element(
+      scan.effects, {}, [&](const ScannedEffect& one) { return evidence_of(one, one.gain[one.best], rules); });
+  std::vector<std::size_t> leading{static_cast<std::size_t>(best - scan.effects.begin())};
+  if (const auto strongest = strongest_alone(model, alone); strongest && *strongest != leading.front())
+    leading.push_back(*strongest);
   return leading;
+}
+
+double square(double x) { return x * x; }
+
+std::vector<const Candidate*> variations_of(const TransitionModel& model) {
+  std::vector<const Candidate*> varying;
+  for (const Variation& variation : model.variations()) varying.push_back(&variation.candidate);
+  return varying;
+}
+
+// Weighs the gain of one more effect beside others: one of so many, and one of its variants.
+double evidence_of_term(const Candidate& effect, double gain, const Rules& rules) {
+  return evidence_of_gain(std::max(0.0, gain), static_cast<double>(effect.parameters.size()), rules) -
+         std::log(static_cast<double>(effect.variants.size()));
+}
+
+// Fits the hypothesis that a variation ends again without each of its effects.
+std::vector<Fit> without_each(const TransitionModel& model, const Fit& joined, const Effort& effort, int threads,
+                              const std::function<void()>& beat) {
+  std::vector<Fit> without(joined.terms.size() - 1);
+  model.side_by_side(without.size(), threads, [&](std::size_t k) {
+    beat();
+    std::vector<EffectTerm> others = joined.terms;
+    others.erase(others.begin() + static_cast<std::ptrdiff_t>(k));
+    without[k] = fit(model, joined.nuisance, others,
+                     {.count = {}, .refit_nuisances = true, .most_iterations = effort.most_iterations});
+  });
+  return without;
 }
 
 }  // namespace
 
+std::optional<InPlace> varies_without_name(const TransitionModel& model, const std::vector<LeftInFacet>& alone) {
+  const std::optional<std::size_t> place = strongest_alone(model, alone);
+  if (!place) return {};
+  const Variation& one = model.variations()[*place];
+  const auto most = std::ranges::max_element(alone, {}, &LeftInFacet::evidence);
+  if (most->facet != one.facet || most->aspect != one.aspect) return {};
+  return InPlace{*place, most->quadratic, 0};
+}
+
+std::optional<InPlace> in_place_of_effects(const TransitionModel& model, const CauseRanking& ranking,
+                                           const RankedCause& best, const Fit& recalibrated, FitsWithout& without,
+                                           std::size_t facets, const DiagnosisOptions& options,
+                                           const std::function<void()>& heartbeat) {
+  const std::vector<const Candidate*> varying = variations_of(model);
+  if (varying.empty() || best.fit.terms.size() < 2 || !ranking.scan.trials_suffice) return {};
+  const double prior = std::log(options.rules.unnamed_alone / static_cast<double>(std::max<std::size_t>(1, facets)));
+  std::optional<InPlace> found;
+  double most = std::log(least_odds);
+  const Fit* others = nullptr;
+  ScannedEffect leader;
+  double own_of_leader = 0;
+  for (std::size_t k = 0; k < best.fit.terms.size(); ++k) {
+    const Fit& rest = without.term(k, heartbeat);
+    const double own =
+        evidence_of_term(*best.fit.terms[k].candidate, 2 * (best.fit.penalised - rest.penalised), options.rules);
+    const EffectScan scan = scan_effects(model, rest, varying, options.threads);
+    if (scan.effects.size() != varying.size()) continue;
+    for (std::size_t v = 0; v < varying.size(); ++v) {
+      const ScannedEffect& one = scan.effects[v];
+      const double promised = prior + evidence_of(one, one.gain[one.best], options.rules) - own;
+      if (!(promised > most)) continue;
+      most = promised;
+      found = InPlace{v, 0, 0};
+      others = &rest;
+      leader = one;
+      own_of_leader = own;
+    }
+  }
+  if (!found) return {};
+  if (heartbeat) heartbeat();
+  const Fit with = fit_one_more(model, effort_for(model, recalibrated), *others, leader, true);
+  found->gain = std::max(0.0, 2 * (with.penalised - others->penalised));
+  found->odds = std::exp(std::min(std::log(largest_odds_in_place),
+                                  prior + evidence_of(leader, found->gain, options.rules) - own_of_leader));
+  if (found->odds < least_odds) return {};
+  return found;
+}
+
 std::map<std::string, double> probabilities_beside_unnamed(const TransitionModel& model, const CauseRanking& ranking,
                                                            const RankedCause& best, const Fit& recalibrated,
                                                            const std::vector<LeftInFacet>& alone,
-                                                           std::size_t candidates, const DiagnosisOptions& options,
+                                                           const std::optional<InPlace>& there, std::size_t candidates,
+                                                           const DiagnosisOptions& options,
                                                            const std::function<void()>& heartbeat) {
-  std::vector<const Candidate*> varying;
-  for (const Variation& variation : model.variations()) varying.push_back(&variation.candidate);
+  const std::vector<const Candidate*> varying = variations_of(model);
   if (varying.empty() || !ranking.scan.trials_suffice) return {};
   const EffectScan scan = scan_effects(model, best.fit, varying, options.threads);
   if (scan.effects.size() != varying.size()) return {};
   const Effort effort = effort_for(model, recalibrated);
   const std::function<void()> beat = markov::one_at_a_time(heartbeat);
-  const std::vector<std::size_t> leading = leading_variations(model, scan, alone, options.rules);
+  const std::vector<std::size_t> leading =
+      there ? std::vector{there->variation} : leading_variations(model, scan, alone, options.rules);
   std::vector<Fit> with(leading.size());
   model.side_by_side(with.size(), options.threads, [&](std::size_t k) {
     beat();
     with[k] = fit_one_more(model, effort, best.fit, scan.effects[leading[k]], true);
   });
-  const Fit& joined = *std::ranges::max_element(with, {}, &Fit::penalised);
+  Fit joined = std::move(*std::ranges::max_element(with, {}, &Fit::penalised));
   if (!(joined.penalised >= best.fit.penalised)) return {};
-  std::vector<double> probability(best.terms.size());
-  model.side_by_side(best.terms.size(), options.threads, [&](std::size_t k) {
-    beat();
-    std::vector<EffectTerm> others = joined.terms;
-    others.erase(others.begin() + static_cast<std::ptrdiff_t>(k));
-    const Fit without = fit(model, joined.nuisance, others,
-                            {.count = {}, .refit_nuisances = true, .most_iterations = effort.most_iterations});
-    const Candidate& effect = *best.terms[k].candidate;
-    const double gain = std::max(0.0, 2 * (joined.penalised - without.penalised));
-    // One effect of so many, and one of its variants, beside what has no name.
-    const double log_odds = evidence_of_gain(gain, static_cast<double>(effect.parameters.size()), options.rules) -
-                            std::log(static_cast<double>(effect.variants.size())) -
-                            std::log(static_cast<double>(std::max<std::size_t>(1, candidates)));
-    probability[k] = 1 / (1 + std::exp(-log_odds));
-  });
+  const double forgiven = there ? square(options.rules.variation_error) * there->gain : 0;
   std::map<std::string, double> by_effect;
-  for (std::size_t k = 0; k < best.terms.size(); ++k) by_effect[best.terms[k].candidate->id] = probability[k];
+  while (joined.terms.size() > 1) {
+    std::vector<Fit> without = without_each(model, joined, effort, options.threads, beat);
+    std::vector<double> probability;
+    for (std::size_t k = 0; k < without.size(); ++k) {
+      const Candidate& effect = *joined.terms[k].candidate;
+      const double gain = 2 * (joined.penalised - without[k].penalised) - forgiven;
+      const double log_odds = evidence_of_term(effect, gain, options.rules) -
+                              std::log(static_cast<double>(std::max<std::size_t>(1, candidates)));
+      by_effect[effect.id] = probability.emplace_back(1 / (1 + std::exp(-log_odds)));
+    }
+    const auto least = std::ranges::min_element(probability);
+    if (!there || *least >= options.rules.least_at_work) break;
+    joined = std::move(without[static_cast<std::size_t>(least - probability.begin())]);
+  }
   return by_effect;
 }
 

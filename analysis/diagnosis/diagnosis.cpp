@@ -18,6 +18,7 @@
 #include "analysis/diagnosis/detectability.h"
 #include "analysis/diagnosis/diagnosis_sentences.h"
 #include "analysis/diagnosis/even_push.h"
+#include "analysis/diagnosis/fits_without.h"
 #include "analysis/diagnosis/gap_tests.h"
 #include "analysis/diagnosis/machine_steps.h"
 #include "analysis/diagnosis/missing_columns.h"
@@ -357,22 +358,53 @@ HeldOutGap hold_out(const TransitionModel& model, const Fitted& fitted, const Hy
   return held_out;
 }
 
+// Gives the verdict. Where a variation without a name says more than all that the catalogue names, or stands in the
+// place of an effect, names are asked beside it.
+Named name_beside_unnamed(const TransitionModel& model, const Fitted& fitted, const Hypotheses& hypotheses,
+                          const Chosen& chosen, const Probabilities& probabilities, std::size_t candidates,
+                          const Diagnosis& d, const Tested& tested, std::optional<FitsWithout>& without,
+                          const DiagnosisOptions& options, const std::function<void()>& beat) {
+  const std::vector<LeftInFacet>& alone = chosen.supposed.front().facets;
+  Odds asked = chosen.unnamed;
+  std::optional<InPlace> there;
+  if (const RankedCause* best = hypotheses.best();
+      without &&
+      chosen.supposed.front().evidence - best->evidence > std::log(d.rules.most_odds_of_none() / d.rules.unnamed_alone))
+    there = varies_without_name(model, alone);
+  if (there) asked = {.alone = 0, .beside = asked.beside, .left = d.rules.certain_odds};
+  Named named = give_verdict(probabilities, asked, tested, d.limits.visible, d.data, d.gap.recalibration_id, d.rules);
+  if (named.at_work.empty() || !without) return named;
+  double unnamed = named.verdict == Verdict::partly_explained ? asked.of_beside() : 0;
+  if (!there)
+    if (const auto found = in_place_of_effects(model, fitted.ranking, *hypotheses.best(), fitted.recalibrated, *without,
+                                               alone.size(), options, beat);
+        found && (named.verdict == Verdict::explained || found->odds > Rules::even_odds)) {
+      there = found;
+      unnamed = std::max(unnamed, found->odds / (1 + found->odds));
+    }
+  if (named.verdict != Verdict::partly_explained && !there) return named;
+  named = corrected(std::move(named),
+                    probabilities_beside_unnamed(model, fitted.ranking, *hypotheses.best(), fitted.recalibrated, alone,
+                                                 there, candidates, options, beat),
+                    unnamed, probabilities.ranked, d.rules);
+  if (named.verdict == Verdict::unexplained) asked = chosen.unnamed;
+  named.p_unnamed = probabilities.of_gap() * std::max(asked.of_unnamed(), unnamed);
+  if (named.verdict == Verdict::explained && named.p_unnamed >= 1 - d.rules.least_at_work)
+    named.verdict = Verdict::partly_explained;
+  return named;
+}
+
 // Says which effects cause the gap, with what probability.
 std::pair<Verdict, Diagnosis::Causes> name_causes(const TransitionModel& model, const Fitted& fitted,
                                                   const Hypotheses& hypotheses, Chosen chosen, std::size_t candidates,
                                                   const Diagnosis& d, const Tested& tested,
-                                                  const DiagnosisOptions& options, const Progress& progress) {
+                                                  std::optional<FitsWithout>& without, const DiagnosisOptions& options,
+                                                  const Progress& progress) {
   Diagnosis::Causes causes;
   Probabilities probabilities =
       share_probabilities(model, fitted.ranking, hypotheses.ordered, candidates, tested, chosen.unnamed, d.rules);
-  Named named =
-      give_verdict(probabilities, chosen.unnamed, tested, d.limits.visible, d.data, d.gap.recalibration_id, d.rules);
-  if (named.verdict == Verdict::partly_explained)
-    named = corrected(std::move(named),
-                      probabilities_beside_unnamed(model, fitted.ranking, *hypotheses.best(), fitted.recalibrated,
-                                                   chosen.supposed.front().facets, candidates, options,
-                                                   [&] { progress(0.86, "what stands beside the unnamed"); }),
-                      chosen.unnamed.of_beside(), probabilities.ranked, d.rules);
+  Named named = name_beside_unnamed(model, fitted, hypotheses, chosen, probabilities, candidates, d, tested, without,
+                                    options, [&] { progress(0.86, "what stands beside the unnamed"); });
   if (!named.at_work.empty()) causes.unnamed_facets = facets_by_probability(chosen, named.p_unnamed, d.rules);
   causes.ranked = std::move(probabilities.ranked);
   causes.not_decided = hypotheses.not_decided;
@@ -396,6 +428,7 @@ struct Decided {
   Hypotheses ranked;
   const Fit* cause;  // of the best hypothesis, or the recalibrated model
   HeldOutGap held_out;
+  std::optional<FitsWithout> without;  // of the best hypothesis; nothing where it is the recalibrated model
 };
 Decided decide(const TransitionModel& model, const Fitted& fitted, const std::vector<const Candidate*>& candidates,
                const DiagnosisOptions& options, const Progress& progress) {
@@ -413,6 +446,8 @@ Decided decide(const TransitionModel& model, const Fitted& fitted, const std::ve
   decided.ranked = hypotheses(model, fitted.ranking);
   Chosen chosen = best_hypothesis(model, fitted, decided.ranked, std::move(found), tested.gap, options);
   decided.cause = chosen.fit;
+  if (chosen.fit != &fitted.recalibrated)
+    decided.without.emplace(model, fitted.ranking, *decided.ranked.best(), fitted.recalibrated);
   if (const std::optional<TrialGroups> two =
           trial_groups(model, fitted.ranking.scan, fitted.recalibrated, *chosen.fit, options.seed))
     d.data.notes.push_back(trial_groups_in_words(model, *two));
@@ -421,8 +456,8 @@ Decided decide(const TransitionModel& model, const Fitted& fitted, const std::ve
   decided.held_out = hold_out(model, fitted, decided.ranked, d.data, chosen, options, progress);
   d.shrinkage.measures = decided.held_out.measures;
   if (tested.gap && trials_to_explain(d.data)) chosen.unnamed.alone = std::max(chosen.unnamed.alone, d.rules.even_odds);
-  std::tie(d.verdict, d.causes) =
-      name_causes(model, fitted, decided.ranked, std::move(chosen), candidates.size(), d, tested, options, progress);
+  std::tie(d.verdict, d.causes) = name_causes(model, fitted, decided.ranked, std::move(chosen), candidates.size(), d,
+                                              tested, decided.without, options, progress);
   return decided;
 }
 
@@ -452,8 +487,8 @@ Diagnosis answer(const TransitionModel& model, const Fitted& fitted, const std::
   const std::vector<const RankedCause*>& ordered = decided.ranked.ordered;
   const RankedCause* best = decided.ranked.best();
   const Fit& cause = *decided.cause;
-  if (best && !d.shrinkage.measures.empty() && d.shrinkage.measures.front().closed) {
-    add_closed_shares(d.causes.at_work, model, fitted.ranking, *best, fitted.given, fitted.recalibrated,
+  if (decided.without && !d.shrinkage.measures.empty() && d.shrinkage.measures.front().closed) {
+    add_closed_shares(d.causes.at_work, model, *best, *decided.without, fitted.given, fitted.recalibrated,
                       decided.held_out.left, options, [&] { progress(0.86, "what each effect closes"); });
     if (d.verdict == Verdict::partly_explained) doubt_effects(d, candidates);
   }

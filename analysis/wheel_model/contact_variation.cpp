@@ -25,7 +25,7 @@ using Weights = std::function<double(const Place&, const Values& variant, std::s
 
 ContactVariation variation(std::string facet, ContactAspect aspect, std::size_t parameters,
                            std::vector<Values> variants, Weights weight) {
-  constexpr std::array<const char*, 3> names{"mean friction", "mean restitution", "scatter of friction"};
+  constexpr std::array<const char*, 4> names{"mean friction", "mean restitution", "scatter of friction", "mean loss"};
   ContactVariation v;
   v.aspect = aspect;
   v.variation.facet = std::move(facet);
@@ -43,22 +43,25 @@ ContactVariation variation(std::string facet, ContactAspect aspect, std::size_t 
   return v;
 }
 
-// Measures a covariate from its mean over all collisions, in its sds there.
+// Measures a covariate from its mean over all collisions but the first so many of each trial, in its sds there.
 template <class Covariate>
-Weights standardised(const WheelRuns& measured, Covariate covariate) {
+Weights standardised(const WheelRuns& measured, Covariate covariate, std::size_t but_first = 0) {
   double count = 0, sum = 0, squares = 0;
   for (std::size_t t = 0; t < measured.runs.size(); ++t) {
     const WheelRun& run = measured.runs[t];
-    for (std::size_t k = 0; k < run.collisions.size(); ++k) {
+    for (std::size_t k = but_first; k < run.collisions.size(); ++k) {
       const double x = covariate(collision_place(run, t, k, run.collisions[k], run.collisions[k].before));
       ++count;
       sum += x;
       squares += x * x;
     }
   }
+  if (count == 0) return [](const Place&, const Values&, std::size_t) { return 0.0; };
   const double mean = sum / count, variance = squares / count - mean * mean;
   const double scale = variance > 1e-12 * squares / count ? 1 / std::sqrt(variance) : 0;
-  return [=](const Place& place, const Values&, std::size_t) { return scale * (covariate(place) - mean); };
+  return [=](const Place& place, const Values&, std::size_t) {
+    return static_cast<std::size_t>(place.number) > but_first ? scale * (covariate(place) - mean) : 0.0;
+  };
 }
 
 std::vector<Values> from_one_to(int last) {
@@ -78,6 +81,23 @@ Weights launch_speed(const WheelRuns& measured) {
   return standardised(measured, [mean](const Place& at) { return at.launch - mean[at.condition]; });
 }
 
+double square(double x) { return x * x; }
+
+// Returns what omega^2 fell by from the collision before to this one.
+double fallen(const Place& at) { return square(at.omega - at.gained) - square(at.omega); }
+
+// Returns what it fell by before that, from the last collision but one.
+double fallen_before(const Place& at) {
+  const double omega = at.omega - at.gained;
+  return square(omega - at.gained_before) - square(omega);
+}
+
+// Returns how much more a fall was than in the mean of the trial so far, as a share of omega^2 here.
+double unusual(const Place& at, double fall) {
+  const double mean = (square(at.launch) - square(at.omega)) / (at.number - 1);
+  return (fall - mean) / square(at.omega);
+}
+
 // Returns cosine and sine of `share` of `halves` half turns.
 double swing(double share, double halves, std::size_t parameter) {
   const double angle = std::numbers::pi * halves * share;
@@ -90,10 +110,11 @@ double is_odd(long number) { return number % 2 == 0 ? -1 : 1; }
 
 CollisionPlace collision_place(const WheelRun& run, std::size_t trial, std::size_t before, const RunCollision& here,
                                double omega) {
-  CollisionPlace place{trial, run.condition, static_cast<int>(before) + 1, omega, omega, 0, 0, here.context};
+  CollisionPlace place{trial, run.condition, static_cast<int>(before) + 1, omega, omega, 0, 0, 0, here.context};
   if (before == 0) return place;
   place.launch = run.collisions[0].before;
   place.gained = omega - run.collisions[before - 1].before;
+  if (before > 1) place.gained_before = run.collisions[before - 1].before - run.collisions[before - 2].before;
   for (std::size_t k = 1; k < before; ++k) place.clock += run.collisions[k].context.since_previous.value_or(0);
   place.clock += here.context.since_previous.value_or(0);
   return place;
@@ -121,7 +142,15 @@ struct VariedDesign {
         conditions(static_cast<int>(measured.conditions.size())),
         launch(launch_speed(measured)),
         speed(standardised(measured, [](const Place& at) { return at.omega; })),
-        gained(standardised(measured, [](const Place& at) { return at.gained; })) {
+        gained(standardised(measured, [](const Place& at) { return at.gained; })),
+        before{standardised(
+                   measured, [](const Place& at) { return unusual(at, fallen(at)); }, 1),
+               standardised(
+                   measured, [](const Place& at) { return unusual(at, fallen_before(at)); }, 2),
+               standardised(
+                   measured, [](const Place& at) { return fallen(at) / square(at.omega - at.gained); }, 1),
+               standardised(
+                   measured, [](const Place& at) { return at.omega - at.gained; }, 1)} {
     for (std::size_t t = 0; t < measured.runs.size(); ++t) {
       const WheelRun& run = measured.runs[t];
       const std::size_t last = run.collisions.size() - 1;
@@ -133,6 +162,8 @@ struct VariedDesign {
   int legs, conditions;                   // legs: 0 where they are not known
   double longest = 1e-3, furthest = 0.1;  // [s], [m]
   Weights launch, speed, gained;
+  std::array<Weights, 4> before;  // what the last collision lost in its trial, and the last but one; what the last
+                                  // lost by its speed, and that speed
 };
 
 double first_collision(const Place& at, const Values&, std::size_t) { return at.number == 1 ? 1.0 : 0.0; }
@@ -197,6 +228,13 @@ std::vector<ContactVariation> variations_of_mean(const VariedDesign& design, Con
   return all;
 }
 
+// Makes the loss of a collision depend on what those before it were like.
+ContactVariation variation_of_loss(const VariedDesign& design) {
+  return variation(
+      "collisions before", ContactAspect::loss, design.before.size(), {{}},
+      [before = design.before](const Place& at, const Values& v, std::size_t p) { return before[p](at, v, p); });
+}
+
 std::vector<ContactVariation> variations_of_scatter(const WheelRuns& measured, const VariedDesign& design) {
   constexpr ContactAspect scatter = ContactAspect::scatter_of_friction;
   std::vector<ContactVariation> all;
@@ -224,6 +262,7 @@ std::vector<ContactVariation> contact_variations(const WheelRuns& measured) {
   std::vector<ContactVariation> all = variations_of_mean(design, ContactAspect::mean_friction);
   for (ContactVariation& one : variations_of_mean(design, ContactAspect::mean_restitution))
     all.push_back(std::move(one));
+  all.push_back(variation_of_loss(design));
   for (ContactVariation& one : variations_of_scatter(measured, design)) all.push_back(std::move(one));
   return all;
 }

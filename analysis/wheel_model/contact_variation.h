@@ -19,6 +19,7 @@ struct CollisionPlace {
   double omega = 0;            ///< before it [rad/s]
   double launch = 0;           ///< first speed of the trial [rad/s]
   double gained = 0;           ///< since the collision before, 0 at the first [rad/s]
+  double gained_before = 0;    ///< from the last but one to the collision before, 0 at the first two [rad/s]
   double clock = 0;            ///< since the trial's first collision [s]
   dynamics::StepContext step;  ///< as measured
 };
@@ -50,7 +51,8 @@ struct ContactVariation {
 /// Lists them for these runs. Of the means: smooth changes along a trial by the clock, swings over the trials, every
 /// other trial, every other leg, one condition, one leg over the trials, the speed of the launch, the first collision,
 /// the change of speed since the collision before and how unusual it was, the speed, waves along the ramp. Of the
-/// scatter: by speed, place, order of trials, leg, at the first collision.
+/// loss: what the two collisions before lost. Of the scatter: by speed, place, order of trials, leg, at the first
+/// collision.
 std::vector<ContactVariation> contact_variations(const WheelRuns& measured);
 
 }  // namespace metastable::analysis

@@ -75,10 +75,12 @@ TEST(ContactVariation, PlacesKnowClockAndChangeOfSpeed) {
   const CollisionPlace first = collision_place(run, 4, 0, run.collisions[0], 5);
   EXPECT_EQ(first.clock, 0);
   EXPECT_EQ(first.gained, 0);
+  EXPECT_EQ(first.gained_before, 0);
   EXPECT_EQ(first.number, 1);
   const CollisionPlace third = collision_place(run, 4, 2, run.collisions[2], 6);
   EXPECT_DOUBLE_EQ(third.clock, 0.5);
   EXPECT_DOUBLE_EQ(third.gained, 0.5);
+  EXPECT_DOUBLE_EQ(third.gained_before, 0.5);
   EXPECT_EQ(third.trial, 4U);
 }
 
