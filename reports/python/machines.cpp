@@ -2,6 +2,8 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
+#include <iterator>
 #include <memory>
 #include <optional>
 #include <stdexcept>
@@ -168,7 +170,10 @@ py::dict diagnose_machine(const py::dict& machine_fields, const py::dict& runs_f
   call.run([&] {
     std::shared_ptr<const analysis::TransitionModel> model = analysis::machine_transitions(machine, std::move(runs));
     analysis::require_effects(study.catalogue, model->effect_ids());
-    found = analysis::diagnose(std::move(model), study);
+    found = analysis::diagnose(model, study);
+    if (found.verdict == analysis::Verdict::recalibrate)  // what it says stands behind the verdict
+      std::ranges::move(analysis::misstated_parameters(*model),
+                        std::inserter(found.sentences, std::next(found.sentences.begin())));
     figures = notebook_figures(found);
   });
   found.model.reset();  // its map asks through this call

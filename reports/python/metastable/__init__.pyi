@@ -57,6 +57,8 @@ class ExpectedSteps(Record):
     sd: float
     median: float
     quantiles: Record
+    @property
+    def value(self) -> float: ...
 
 
 class Provenance(Record):
@@ -145,6 +147,8 @@ class Solution(Result):
 class WalkerSteps(MeshEstimate):
     from_quasi_stationary: Optional[float]
     from_quasi_stationary_interval_95: Optional[Interval]
+    @property
+    def from_start(self) -> float: ...
 
 
 class WalkerStudy(Result):

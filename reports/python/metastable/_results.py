@@ -19,6 +19,12 @@ class Record:
     def __getitem__(self, name):
         return self.__dict__[name]
 
+    def __getattr__(self, name):
+        what = f"'{type(self).__name__}' object has no attribute '{name}'"
+        if not name.startswith("_"):
+            what += f"; it has {', '.join(self.keys())}"
+        raise AttributeError(what, name=name, obj=self)
+
     def __iter__(self):
         return iter(self.keys())
 
@@ -161,7 +167,16 @@ class HowItFails(Record):
         return ax
 
 
-_kinds = {"how_it_fails": HowItFails}
+class ExpectedSteps(Record):
+    """Expected steps before failure. Those from the start are `from_start` of wheels and `value` of walkers; either
+    name may be asked of both."""
+
+    def __getattr__(self, name):
+        other = {"from_start": "value", "value": "from_start"}.get(name)
+        return self.__dict__[other] if other in self.__dict__ else super().__getattr__(name)
+
+
+_kinds = {"how_it_fails": HowItFails, "expected_steps": ExpectedSteps, "settings[].expected_steps": ExpectedSteps}
 
 
 class Study(Result):

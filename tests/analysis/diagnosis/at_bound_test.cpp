@@ -37,6 +37,7 @@ std::string all_of(const Diagnosis& d) {
 
 TEST(AtBound, AnEffectThatIsLargerThanItMayBeIsSaid) {
   Machine machine = linear_machine(0.05);
+  machine.parameters[0].sd = machine.parameters[1].sd = 0;  // One that is known less well than stated would do as much.
   machine.effects = {{"bend", {{"c", 0, -0.05, 0.05}}}};
   for (const unsigned seed : {1U, 2U}) {
     const Diagnosis d = diagnosed_with(machine, -0.1, 0.3, seed);

@@ -50,6 +50,12 @@ class Pendulum(unittest.TestCase):
         low, high = answer.contact.interval_90["decay"]
         self.assertTrue(low < 0.965 < high)
 
+    def test_a_parameter_that_is_stated_too_surely_is_said_with_its_sds(self):
+        answer = diagnosed(pendulum(parameters={"decay": (0.99, 0.001), "scatter_rad": (0.003, 0.003, 1e-5, 0.1)}))
+        self.assertEqual(answer.verdict, "recalibrate")
+        self.assertRegex(answer.sentences[1], r"^decay is 0\.97\d* \(90 %: .* to .*\), 1\d of its stated sds from 0\.99: known "
+                                              "less well than stated")
+
     def test_dry_friction_is_named_with_its_size(self):
         answer = diagnosed(loss=0.004)
         self.assertEqual(answer.verdict, "explained")
@@ -98,6 +104,9 @@ class Failing(unittest.TestCase):
             alive, state = alive[~failed], state[~failed]
         self.assertIn(answer.verdict, ("no_gap", "recalibrate"))
         study = machine.walker(start=[0]).study(simulated_steps=0)
+        self.assertEqual(study.expected_steps.from_start, study.expected_steps.value)
+        with self.assertRaisesRegex(AttributeError, "'ExpectedSteps' object has no attribute 'mean'; it has value, interval_95"):
+            study.expected_steps.mean
         self.assertLess(abs(np.log(study.expected_steps.value / steps.mean())), 0.1)
         self.check_walkers(machine)
         self.assertLess(abs(np.log(answer.steps_before_failure.baseline / steps.mean())), 0.1)
@@ -129,6 +138,12 @@ class Refused(unittest.TestCase):
         self.check("effects: dry: loss_rad: 2 numbers given, 3 to 3 expected", lambda: pendulum(effects={"dry": {"loss_rad": (0, 1)}}))
         self.check("correlation 0.7 between neighbouring rows is outside [-0.5, 0.5]", lambda: pendulum(sensor={"swing_rad": (0.1, 0.7)}))
         self.check("step: a function expected", lambda: pendulum(step=3), TypeError)
+
+    def test_an_error_that_is_too_small_for_a_density(self):
+        self.check("sensor: swing_rad: the machine's noise does not reach it, and the sd of its error, 1e-10, is less than 1e-06 "
+                   "of its change from row to row", lambda: diagnosed(pendulum(
+                       lambda s, z, p: ((p["decay"] * s[:, 0])[:, None], np.zeros(len(s), bool)),
+                       sensor={"swing_rad": 1e-10}), trials=5))
 
     def test_a_step_that_is_none(self):
         def asked(function):
