@@ -1,13 +1,24 @@
 #include "analysis/machine_model/machine_design.h"
 
+#include <fmt/format.h>
+
 #include <algorithm>
+#include <array>
 #include <cmath>
+#include <limits>
+#include <numbers>
 #include <numeric>
+#include <utility>
 
 #include "analysis/statistics/median.h"
 
 namespace metastable::analysis {
 namespace {
+
+// A column wraps that stays within a turn, but for its errors, and jumps by about one, while it seldom moves by half of
+// one: an assumption, of machines that turn by less than that in a step.
+constexpr double within_turn = 1.05, full_jump = 0.7, half_jump = 0.4, least_span = 0.9;
+constexpr std::size_t fewest_jumps = 3, jumps_to_moves = 10;
 
 // Fills in means and spreads of the columns.
 void measure_columns(MachineDesign& design, const Machine& machine, const MachineRuns& runs) {
@@ -65,7 +76,43 @@ void measure_place(MachineDesign& design, const MachineRuns& runs) {
   design.placed = design.placed && design.last_position > design.first_position;
 }
 
+// Counts the jumps of a column by about a turn; 0 where it leaves the turn, or moves as widely otherwise.
+std::size_t jumps_by(const MachineRuns& runs, std::size_t sensor, double turn) {
+  double least = std::numeric_limits<double>::infinity(), most = -least;
+  std::size_t jumps = 0, moves = 0;
+  for (const MachineTrial& trial : runs.trials)
+    for (std::size_t k = 0; k < trial.rows.size(); ++k) {
+      const double here = trial.rows[k].seen[sensor];
+      if (std::isnan(here)) continue;
+      least = std::min(least, here);
+      most = std::max(most, here);
+      const double moved = k > 0 ? std::abs(here - trial.rows[k - 1].seen[sensor]) : 0;  // NaN after a lost row
+      if (moved > full_jump * turn) {
+        ++jumps;
+      } else if (moved > half_jump * turn) {
+        ++moves;
+      }
+    }
+  const double span = most - least;
+  return span > least_span * turn && span < within_turn * turn && jumps >= jumps_to_moves * moves ? jumps : 0;
+}
+
 }  // namespace
+
+std::vector<std::string> wrapping_columns(const Machine& machine, const MachineRuns& runs) {
+  constexpr std::array<std::pair<double, const char*>, 2> turns{
+      {{2 * std::numbers::pi, "2 pi"}, {360.0, "360 degrees"}}};
+  std::vector<std::string> asked;
+  for (std::size_t j = 0; j < machine.observe.size(); ++j)
+    for (const auto& [turn, name] : turns)
+      if (const std::size_t jumps = jumps_by(runs, j, turn); jumps >= fewest_jumps)
+        asked.push_back(fmt::format(
+            "{0}: it jumps by about {1} from one row to the next {2} times and stays within {1}: is it an angle that "
+            "wraps? Slopes across a jump are wrong: unwrap it along each trial (numpy.unwrap), and let the step go on "
+            "beyond {1}?",
+            machine.observe[j].state, name, jumps));
+  return asked;
+}
 
 MachineDesign machine_design(const Machine& machine, const MachineRuns& runs) {
   MachineDesign design;

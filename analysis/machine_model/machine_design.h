@@ -45,6 +45,10 @@ struct MachineDesign {
 
 MachineDesign machine_design(const Machine& machine, const MachineRuns& runs);
 
+/// Asks, in a sentence each, about sensors whose values seem to wrap: they stay within a turn (2 pi, or 360) and jump by
+/// about one from row to row. Slopes of the map across such a jump are wrong.
+std::vector<std::string> wrapping_columns(const Machine& machine, const MachineRuns& runs);
+
 /// Returns a number for every step.
 template <class Of>
 std::vector<double> by_step(const MachineDesign& design, Of of) {

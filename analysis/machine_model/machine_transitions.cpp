@@ -57,6 +57,7 @@ class MachineTransitions : public TransitionModel {
         machine_(machine->dear ? std::make_shared<Machine>(joining_steps(machine)) : machine),
         runs_(std::move(runs)) {
     notes_ = look_over(*machine_, runs_);
+    for (std::string& question : wrapping_columns(*machine_, runs_)) notes_.push_back(std::move(question));
     design_ = std::make_shared<MachineDesign>(machine_design(*machine_, runs_));
     set_up_nuisances();
     plan_ = score_plan(*machine_, runs_, hypothesis(nominal_values(*this), {}));

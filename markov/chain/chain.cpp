@@ -40,7 +40,7 @@ void spread_backwards(const Incoming& into, std::vector<std::uint8_t>& marked) {
 std::string describe(const std::string& solver, double residual, const std::string& detail) {
   std::ostringstream message;
   message << solver << " did not converge: ";
-  if (!std::isnan(residual)) message << "residual " << residual << ": ";
+  if (std::isfinite(residual)) message << "residual " << residual << ": ";
   message << detail;
   return message.str();
 }

@@ -9,6 +9,7 @@
 #include <stdexcept>
 #include <string>
 
+#include "analysis/machine_model/machine_design.h"
 #include "tests/analysis/machine_model/machines.h"
 #include "tests/message_of.h"
 
@@ -157,6 +158,43 @@ TEST_F(LookedOver, TimeThatRunsBackIsRefused) {
   runs_.trials[2].rows[5].time = 1.25;
   EXPECT_EQ(message_of<std::invalid_argument>([&] { said(); }),
             "time_s: it runs back in trial 3, row 6: 1.25 comes after 1.5");
+}
+
+/// Returns what is asked about a heading that gains 0.7 rad a step in six trials, as the log has it.
+std::vector<std::string> asked_of_headings(double unit, bool wrapped) {
+  Machine machine;
+  machine.observe = {{"heading", 0.01}};
+  MachineRuns runs;
+  runs.trials.resize(6);
+  for (std::size_t t = 0; t < runs.trials.size(); ++t)
+    for (std::size_t k = 0; k < 30; ++k) {
+      const double heading = static_cast<double>(t) + 0.7 * static_cast<double>(k);
+      runs.trials[t].rows.push_back(
+          {.seen = {unit * (wrapped ? std::remainder(heading, 2 * std::numbers::pi) : heading)}});
+    }
+  return wrapping_columns(machine, runs);
+}
+
+TEST(WrappingColumns, AreAskedAboutInEitherUnit) {
+  for (const double unit : {1.0, 180 / std::numbers::pi}) {
+    const std::vector<std::string> asked = asked_of_headings(unit, true);
+    ASSERT_EQ(asked.size(), 1u);
+    EXPECT_EQ(asked[0].find("heading: it jumps by about " + std::string(unit == 1 ? "2 pi" : "360 degrees")), 0u)
+        << asked[0];
+    EXPECT_TRUE(asked[0].ends_with('?'));
+    EXPECT_TRUE(asked_of_headings(unit, false).empty());
+  }
+}
+
+TEST(WrappingColumns, ValuesThatMoveAsWidelyOtherwiseAreNone) {
+  Machine machine;
+  machine.observe = {{"height", 0.01}};
+  MachineRuns runs;
+  runs.trials.resize(1);
+  for (std::size_t k = 0; k < 200; ++k)  // spread over a turn, each on its own
+    runs.trials[0].rows.push_back(
+        {.seen = {2 * std::numbers::pi * std::fmod(0.618034 * static_cast<double>(k * k), 1)}});
+  EXPECT_TRUE(wrapping_columns(machine, runs).empty());
 }
 
 }  // namespace
