@@ -117,7 +117,7 @@ std::optional<InPlace> in_place_of_effects(const TransitionModel& model, const C
   found->gain = std::max(0.0, 2 * (with.penalised - others->penalised));
   found->odds = std::exp(std::min(std::log(largest_odds_in_place),
                                   prior + evidence_of(leader, found->gain, options.rules) - own_of_leader));
-  if (found->odds < least_odds) return {};
+  if (!(found->odds > 1 / options.rules.most_odds_of_none())) return {};  // The name stays while it may be as likely.
   return found;
 }
 

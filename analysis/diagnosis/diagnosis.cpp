@@ -378,7 +378,7 @@ Named name_beside_unnamed(const TransitionModel& model, const Fitted& fitted, co
   if (!there)
     if (const auto found = in_place_of_effects(model, fitted.ranking, *hypotheses.best(), fitted.recalibrated, *without,
                                                alone.size(), options, beat);
-        found && (named.verdict == Verdict::explained || found->odds > Rules::even_odds)) {
+        found) {
       there = found;
       unnamed = std::max(unnamed, found->odds / (1 + found->odds));
     }
