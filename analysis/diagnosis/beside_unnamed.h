@@ -27,8 +27,8 @@ struct InPlace {
 std::optional<InPlace> varies_without_name(const TransitionModel& model, const std::vector<LeftInFacet>& alone);
 
 /// Finds the variation that fits best in the place of one effect of a hypothesis of several, the others kept. Of one
-/// effect the variations at the recalibrated model say so. Nothing where none is 1 / Rules::most_odds_of_none() times as
-/// likely as the effect.
+/// effect the variations at the recalibrated model say so. Nothing where none is clearly likelier than the
+/// effect, by 1 / Rules::most_odds_of_none().
 /// @param without  fits of the hypothesis without each effect  @param facets  in how many something may act
 std::optional<InPlace> in_place_of_effects(const TransitionModel& model, const CauseRanking& ranking,
                                            const RankedCause& best, const Fit& recalibrated, FitsWithout& without,
