@@ -15,8 +15,9 @@
 namespace metastable::analysis {
 namespace {
 
-constexpr std::uint64_t draws_of_gap = 16;  // experiments over which a gap's likelihoods are averaged,
-constexpr std::size_t fits_of_gap = 4;      //   and those of them that parameters are fitted to
+// The likelihoods of a gap are averaged over so many drawn experiments. Parameters are fitted to the first few of them.
+constexpr std::uint64_t draws_of_gap = 16;
+constexpr std::size_t fits_of_gap = 4;
 
 dynamics::NominalValues contact_of(const dynamics::NominalValues& stated,
                                    const std::vector<dynamics::Effect>& effects) {
@@ -44,8 +45,8 @@ struct Supposed {
   std::vector<EffectTerm> terms;
 };
 
-// Returns what fits best in the mean over experiments. Of those it is fitted to a fit gains as much by chance as it
-// loses on as many others.
+// Returns what fits best in the mean over experiments. On those that it is fitted to, a fit gains by chance as much as
+// it loses on as many others.
 Supposed best_supposed(const std::vector<std::unique_ptr<TransitionModel>>& drawn, const Supposed& start,
                        bool recalibrated) {
   Supposed mean = start;

@@ -12,9 +12,9 @@
 namespace metastable::analysis {
 namespace {
 
-// The first saves time, the other is an overflow's.
-constexpr double least_odds = 0.05;             // of a variation in an effect's place, that are followed
-constexpr double largest_odds_in_place = 1e12;  // that are told
+// A variation in an effect's place is fitted where a scan promises it these odds or more, which saves time. Odds above
+// the second number are told as that number, so that they do not overflow.
+constexpr double least_odds = 0.05, largest_odds_in_place = 1e12;
 
 // Returns the place of the variation that says most by itself, by the facets it was weighed in; nothing where it was
 // none.
@@ -51,7 +51,7 @@ std::vector<const Candidate*> variations_of(const TransitionModel& model) {
   return varying;
 }
 
-// Weighs the gain of one more effect beside others: one of so many, and one of its variants.
+// Weighs the gain of one more effect beside others, of which one of several variants was chosen.
 double evidence_of_term(const Candidate& effect, double gain, const Rules& rules) {
   return evidence_of_gain(std::max(0.0, gain), static_cast<double>(effect.parameters.size()), rules) -
          std::log(static_cast<double>(effect.variants.size()));

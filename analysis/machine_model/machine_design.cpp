@@ -15,8 +15,8 @@
 namespace metastable::analysis {
 namespace {
 
-// A column wraps that stays within a turn, but for its errors, and jumps by about one, while it seldom moves by half of
-// one: an assumption, of machines that turn by less than that in a step.
+// A column wraps if it stays within a turn, but for its errors, and jumps by about one turn, while it seldom moves by
+// half of one. The numbers assume that the machine turns by less than that in a step.
 constexpr double within_turn = 1.05, full_jump = 0.7, half_jump = 0.4, least_span = 0.9;
 constexpr std::size_t fewest_jumps = 3, jumps_to_moves = 10;
 

@@ -30,17 +30,18 @@ constexpr double least_sensor = 1e-6, usual_sensor = 0.1;  // sd of an error tha
 constexpr double sensor_prior = 3;                         // sd of its logarithm
 constexpr double usual_wild = -7, wild_prior = 1.5, least_wild = -12;  // logit of the share of wild rows
 constexpr double parameter_step = 1e-3;  // of the sd with which it is known, for differences
-constexpr double widest_refit = 20;      // that a parameter is refitted by, at least, and
-constexpr double widest_share = 0.5;     //   this share of its nominal value
-constexpr double seen_share = 1e-6;      // of a column's change, that its noise or its error must exceed
+// A parameter is refitted within so many of its sds, or within this share of its nominal value where that is wider.
+constexpr double widest_refit = 20, widest_share = 0.5;
+constexpr double seen_share = 1e-6;  // of a column's change, that its noise or its error must exceed
 
 // A recalibration may leave what is stated of a parameter behind. So many stated parameters are known less well than it
 // is stated: an assumption, that of the wheel's contact. Physicists have done worse: of intervals that were to hold 98
 // % of physical constants, later measurements left 9 to 57 % (Henrion and Fischhoff 1986, Am. J. Phys. 54, 791).
 constexpr double misstated_share = 0.01;
-constexpr double strained_sds = 2;       // that a parameter is off, for others than the stated priors to be tried
-constexpr double misstated_sds = 3;      // that it is off, for what is stated of it to be set aside: 0.3 % by chance
-constexpr std::size_t most_instead = 3;  // effects that may speak for what is stated, those that promise most
+// A parameter is looked at from two of its stated sds on, and what is stated of it is set aside from three, which
+// chance reaches in 0.3 %. The effects that promise most, so many, may speak for the stated value.
+constexpr double strained_sds = 2, misstated_sds = 3;
+constexpr std::size_t most_instead = 3;
 
 // Steps that are drawn for the expected steps, and failures that end them: 6 % of error. Below a few failures they say
 // next to nothing.
@@ -384,8 +385,8 @@ bool MachineTransitions::effect_speaks_for_what_is_stated(const Fit& recalibrate
   });
 }
 
-// What is stated of a parameter is set aside where a recalibration leaves it behind and no effect speaks for it: it
-// counts against no hypothesis then, and no effect gains by bringing the parameter back.
+// Sets aside what is stated of each parameter that a recalibration moves far from it, where no effect speaks for the
+// stated value. The stated value then counts against no hypothesis, and no effect gains by bringing the parameter back.
 void MachineTransitions::set_aside_what_is_misstated() {
   const Fit recalibrated = fit(*this, nominal_values(*this), {});
   std::size_t slot = 0;

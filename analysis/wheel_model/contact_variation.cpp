@@ -162,8 +162,9 @@ struct VariedDesign {
   int legs, conditions;                   // legs: 0 where they are not known
   double longest = 1e-3, furthest = 0.1;  // [s], [m]
   Weights launch, speed, gained;
-  std::array<Weights, 4> before;  // what the last collision lost in its trial, and the last but one; what the last
-                                  // lost by its speed, and that speed
+  // They follow what the last collision lost in its trial, and the last but one; what the last lost by its speed, and
+  // that speed.
+  std::array<Weights, 4> before;
 };
 
 double first_collision(const Place& at, const Values&, std::size_t) { return at.number == 1 ? 1.0 : 0.0; }

@@ -553,8 +553,7 @@ MeshEstimate steps_from_quasi_stationary(const MeshStudy& study) {
 }
 
 double study_score_spacing(const BatchMap& map) {
-  // Of one score the landing is read as a curve, which takes further places where it needs them. One dimension costs
-  // little, and its narrow intervals show what places further apart leave.
+  // The curve of one score takes further places where it needs them. Intervals of one dimension are the narrowest.
   return map.scores > 1 ? 0.6 : map.dimension == 1 ? 0.8 : 1.0;
 }
 

@@ -21,7 +21,8 @@ constexpr int foreseen = 2;             // further halvings of a gap that a dear
 // Pairs of Gauss's points a cell of the lattice, by dimension: the intervals of one and two dimensions are narrow
 // enough to show what fewer leave.
 constexpr std::array<double, 4> per_cell{2, 2, 1.5, 1.5};
-constexpr double pair_limit = 1024;  // such pairs between two places
+// Between two places there are at most so many pairs.
+constexpr double pair_limit = 1024;
 
 using Point = NodeLattice::Point;
 

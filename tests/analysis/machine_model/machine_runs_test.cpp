@@ -191,7 +191,7 @@ TEST(WrappingColumns, ValuesThatMoveAsWidelyOtherwiseAreNone) {
   machine.observe = {{"height", 0.01}};
   MachineRuns runs;
   runs.trials.resize(1);
-  for (std::size_t k = 0; k < 200; ++k)  // spread over a turn, each on its own
+  for (std::size_t k = 0; k < 200; ++k)  // The values are spread over a turn at random.
     runs.trials[0].rows.push_back(
         {.seen = {2 * std::numbers::pi * std::fmod(0.618034 * static_cast<double>(k * k), 1)}});
   EXPECT_TRUE(wrapping_columns(machine, runs).empty());

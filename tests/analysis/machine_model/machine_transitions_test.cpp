@@ -66,8 +66,9 @@ INSTANTIATE_TEST_SUITE_P(MachineTransitions, WhatWasDone,
                                          Done{"b_drift", 0, 0.3, 0, 0.3}, Done{"b_spread", 0, 0, 0.15, 0.15}),
                          [](const auto& instance) { return std::string(instance.param.cause); });
 
-// What is stated is 0.9 +- 0.01, and the machine has 0.84: the parameter is off, and no effect is at work. One of two
-// suspected effects has the very form of the parameter: it is said beside it. (A bend was named with probability 1.)
+// The model states a parameter as 0.9 +- 0.01, and the machine has 0.84, so that the parameter is off and no effect is
+// at work. One of two suspected effects has the same form as the parameter, and the sentence names it beside the
+// parameter.
 TEST(MachineTransitions, AParameterThatIsStatedTooSurelyIsNoEffect) {
   Machine machine = linear_machine(0.02);
   machine.parameters = {{"a", 0.9, 0.01}, {"b", 0.2, 0.002}, {"s", 0.1, 0.05, 1e-3, 1}};
