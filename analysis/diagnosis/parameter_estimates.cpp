@@ -6,6 +6,7 @@
 
 #include "analysis/fitting/cause_ranking.h"
 #include "analysis/fitting/effect_scan.h"
+#include "analysis/fitting/likelihood_ends.h"
 #include "analysis/statistics/interval_95.h"
 #include "dynamics/numerics/truncated_normal.h"
 #include "markov/dense_matrix.h"
@@ -13,7 +14,6 @@
 namespace metastable::analysis {
 namespace {
 
-constexpr double surely_there = 6;     // gain of an effect whose interval does not hold none of it
 constexpr double least_weight = 1e-3;  // of a variant, to widen an interval
 
 std::vector<EstimatedParameter> as_reported(const EffectTerm& term) {
@@ -64,22 +64,6 @@ std::vector<EstimatedParameter> estimates(const EffectTerm& term, const Eigen::M
     all[k].fitted = half > 0;
   }
   return all;
-}
-
-// Where the likelihood is flat at an effect's value (a foot that always sticks) its curvature there says nothing, and
-// an interval would hold the neutral value that the gain excludes: towards it the likelihood itself is followed.
-std::vector<EstimatedParameter> off_neutral(const TransitionModel& model, const RankedCause& ranked, double half) {
-  const EffectTerm& term = ranked.terms[0];
-  const double neutral = term.candidate->parameters[0].neutral;
-  const double allowed = normal_90 * normal_90 / 2;  // fall of the log likelihood
-  double out = neutral, in = term.values[0];
-  for (int halving = 0; halving < 12; ++halving) {
-    EffectTerm tried = term;
-    tried.values[0] = (out + in) / 2;
-    const double fall = ranked.fit.log_likelihood - model.evaluate(ranked.fit.nuisance, {&tried, 1}).total();
-    (fall > allowed ? out : in) = tried.values[0];
-  }
-  return neutral < term.values[0] ? between(term, in, term.values[0] + half) : between(term, term.values[0] - half, in);
 }
 
 // Holds what one of an effect's variants says of its numbers.
@@ -140,26 +124,19 @@ void cover_variants(const RankedCause& ranked, const EffectScan& scan, std::vect
     }
 }
 
-// A number that one nuisance alone moves lies between its values at that one's ends, inside its bounds.
-void keep_positive(const TransitionModel& model, const Fit& fit, const Eigen::MatrixXd& covariance,
-                   const Eigen::VectorXd& slope, std::size_t number, EstimatedParameter& estimate) {
-  if ((slope.array() != 0).count() != 1) return;
-  Eigen::Index p = 0;
-  slope.cwiseAbs().maxCoeff(&p);
-  const Nuisance& n = model.nuisances()[static_cast<std::size_t>(p)];
-  const double half = normal_90 * std::sqrt(std::max(0.0, covariance(p, p)));
-  const auto at = [&](double value) {
-    std::vector<double> moved = fit.nuisance;
-    moved[static_cast<std::size_t>(p)] = std::clamp(value, n.lower, n.upper);
-    return model.report_nuisances(moved)[number].second;
-  };
-  const double here = fit.nuisance[static_cast<std::size_t>(p)];
-  std::tie(estimate.lower, estimate.upper) = std::minmax({at(here - half), at(here + half)});
+// Returns the 90 % interval of a nuisance, by chance and by what errors of the model's form move it.
+std::pair<double, double> nuisance_ends(const TransitionModel& model, const Fit& fit, const Eigen::MatrixXd& covariance,
+                                        Eigen::Index slot) {
+  const Nuisance& n = model.nuisances()[static_cast<std::size_t>(slot)];
+  const double here = fit.nuisance[static_cast<std::size_t>(slot)], form = normal_90 * n.form_sd;
+  const auto [low, high] = likelihood_ends(model, fit, covariance, slot);
+  return {std::clamp(here - std::hypot(here - low, form), n.lower, n.upper),
+          std::clamp(here + std::hypot(high - here, form), n.lower, n.upper)};
 }
 
 }  // namespace
 
-Cause described_cause(const TransitionModel& model, const RankedCause& ranked, const EffectScan& scan) {
+Cause described_cause(const TransitionModel& model, const RankedCause& ranked, const EffectScan& scan, bool likely) {
   Cause cause;
   for (const EffectTerm& term : ranked.terms) cause.effects.push_back(term.candidate->id);
   cause.gain = ranked.gain;
@@ -173,39 +150,47 @@ Cause described_cause(const TransitionModel& model, const RankedCause& ranked, c
   const Eigen::MatrixXd covariance = markov::floored_inverse(ranked.fit.information, resolved_share);
   auto first = static_cast<Eigen::Index>(model.nuisances().size());
   for (const EffectTerm& term : ranked.terms) {
-    cause.parameters.push_back(estimates(term, covariance, first));
+    if (likely && term.values.size() == 1) {
+      const auto [low, high] = likelihood_ends(model, ranked.fit, covariance, first);
+      cause.parameters.push_back(between(term, low, high));
+    } else {
+      cause.parameters.push_back(estimates(term, covariance, first));
+    }
     first += static_cast<Eigen::Index>(term.values.size());
-  }
-  if (ranked.terms.size() == 1 && ranked.terms[0].values.size() == 1) {
-    const EffectTerm& term = ranked.terms[0];
-    const double half = normal_90 * std::sqrt(std::max(0.0, covariance(first - 1, first - 1)));
-    if (std::abs(term.values[0] - term.candidate->parameters[0].neutral) < half && ranked.gain > surely_there)
-      cause.parameters[0] = off_neutral(model, ranked, half);
   }
   if (ranked.terms.size() == 1) cover_variants(ranked, scan, cause.parameters[0]);
   return cause;
 }
 
-// Intervals follow the slopes of the reported numbers, unless those take a positive one below zero.
 std::vector<EstimatedParameter> contact_estimates(const TransitionModel& model, const Fit& fit) {
-  Eigen::MatrixXd covariance = markov::floored_inverse(fit.information, resolved_share);
+  const Eigen::MatrixXd by_chance = markov::floored_inverse(fit.information, resolved_share);
+  Eigen::MatrixXd covariance = by_chance;
   for (std::size_t p = 0; p < fit.nuisance.size(); ++p) {
     const auto at = static_cast<Eigen::Index>(p);
     covariance(at, at) += model.nuisances()[p].form_sd * model.nuisances()[p].form_sd;
   }
   std::vector<EstimatedParameter> all;
   const std::vector<NamedValue> here = model.report_nuisances(fit.nuisance);
+  const auto with = [&](Eigen::Index slot, double value, std::size_t number) {
+    std::vector<double> moved = fit.nuisance;
+    moved[static_cast<std::size_t>(slot)] = value;
+    return model.report_nuisances(moved)[number].second;
+  };
   for (std::size_t k = 0; k < here.size(); ++k) {
     Eigen::VectorXd slope(covariance.rows());
-    for (std::size_t p = 0; p < fit.nuisance.size(); ++p) {
-      std::vector<double> moved = fit.nuisance;
-      moved[p] += model.nuisances()[p].step;
-      slope[static_cast<Eigen::Index>(p)] =
-          (model.report_nuisances(moved)[k].second - here[k].second) / model.nuisances()[p].step;
+    for (Eigen::Index p = 0; p < slope.size(); ++p) {
+      const auto slot = static_cast<std::size_t>(p);
+      const double step = model.nuisances()[slot].step;
+      slope[p] = (with(p, fit.nuisance[slot] + step, k) - here[k].second) / step;
     }
     const double half = normal_90 * std::sqrt(std::max(0.0, slope.dot(covariance * slope)));
     all.push_back({here[k].first, here[k].second, here[k].second - half, here[k].second + half, true});
-    if (here[k].second > 0 && all.back().lower < 0) keep_positive(model, fit, covariance, slope, k, all.back());
+    if ((slope.array() != 0).count() == 1) {
+      Eigen::Index alone = 0;
+      slope.cwiseAbs().maxCoeff(&alone);
+      const auto [low, high] = nuisance_ends(model, fit, by_chance, alone);
+      std::tie(all.back().lower, all.back().upper) = std::minmax({with(alone, low, k), with(alone, high, k)});
+    }
   }
   return all;
 }

@@ -24,6 +24,7 @@ namespace {
 constexpr double largest_log_odds = 300;  // of something unnamed: their exponential stays finite
 constexpr std::size_t most_beside = 3;    // hypotheses, the recalibrated model not counted,
 constexpr double beside_margin = 12;      //   whose evidence is no further behind the best
+constexpr double followed_weight = 1e-3;  // of a hypothesis beside the best, whose intervals follow the likelihood
 
 // Returns the square that the largest of so many standard normals exceeds with this probability, to first order.
 double square_by_chance(double level, std::size_t cells) {
@@ -154,7 +155,7 @@ Hypotheses hypotheses(const TransitionModel& model, const CauseRanking& ranking)
     if (decided)
       all.ordered.push_back(&cause);
     else
-      all.not_decided.push_back(described_cause(model, cause, ranking.scan));
+      all.not_decided.push_back(described_cause(model, cause, ranking.scan, false));
   };
   for (const RankedCause& cause : ranking.singles) list(cause, cause.not_decided.empty());
   for (const auto* several : {&ranking.pairs, &ranking.sets})
@@ -232,8 +233,9 @@ Probabilities share_probabilities(const TransitionModel& model, const CauseRanki
   all.none = weight_none / sum;
   (tested.recalibrates ? all.recalibrate : all.no_gap) = weight_null / sum;
   for (const RankedCause* cause : ordered) {
-    all.ranked.push_back(described_cause(model, *cause, ranking.scan));
-    all.ranked.back().probability = share * std::exp(cause->evidence - top) / effects / sum;
+    const double weight = std::exp(cause->evidence - top);
+    all.ranked.push_back(described_cause(model, *cause, ranking.scan, weight > followed_weight));
+    all.ranked.back().probability = share * weight / effects / sum;
   }
   return all;
 }

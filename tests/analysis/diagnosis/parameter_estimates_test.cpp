@@ -34,7 +34,7 @@ TEST(ParameterEstimates, CoverVariantsThatTheDataHardlyTellApart) {
     scan.effects = {{&sag, {10, gain}, {Eigen::VectorXd::Constant(1, 2), Eigen::VectorXd::Constant(1, 3)}, {0, 1}, 0}};
     scan.information = 100 * Eigen::MatrixXd::Identity(2, 2);
     scan.whole = scan.information.diagonal();
-    const std::vector<EstimatedParameter> told = described_cause(model, ranked, scan).parameters[0];
+    const std::vector<EstimatedParameter> told = described_cause(model, ranked, scan, false).parameters[0];
     EXPECT_NEAR(told[0].lower, 1.836, 1e-3);
     EXPECT_NEAR(told[0].upper, upper, 1e-3);
     EXPECT_FALSE(told[1].fitted);
@@ -69,7 +69,7 @@ TEST(ParameterEstimates, OfALargeEffectDoNotHoldNoneOfIt) {
   ranked.terms = ranked.fit.terms;
   ranked.gain = 2 * (ranked.fit.penalised - without.penalised);
   ASSERT_GT(ranked.gain, 100);
-  const EstimatedParameter told = described_cause(model, ranked, {}).parameters[0][0];
+  const EstimatedParameter told = described_cause(model, ranked, {}, true).parameters[0][0];
   EXPECT_GT(told.lower, 1);
   EXPECT_GT(told.upper, 8);
   const std::vector<EffectTerm> end{test::term(model, "slope", {}, {told.lower})};
