@@ -8,6 +8,17 @@
 #include <stdexcept>
 
 namespace metastable::markov {
+namespace {
+
+constexpr double most_points = 1e7;
+
+// Returns the volume of the ball in units of the spacing, about as many points as it holds.
+double foreseen_points(int scores, double in_spacings) {
+  const double half = 0.5 * scores;
+  return std::exp(half * std::log(std::numbers::pi) - std::lgamma(half + 1) + scores * std::log(in_spacings));
+}
+
+}  // namespace
 
 ScoreLattice::ScoreLattice(int scores, double spacing, double reach)
     : scores_(static_cast<std::size_t>(scores)), spacing_(spacing) {
@@ -15,6 +26,11 @@ ScoreLattice::ScoreLattice(int scores, double spacing, double reach)
   if (!(spacing > 0 && spacing <= 1) || !(reach > 0))
     throw std::invalid_argument(
         fmt::format("lattice: spacing {} outside (0, 1] or reach {} not positive", spacing, reach));
+  if (const double foreseen = foreseen_points(scores, reach / spacing); foreseen > most_points)
+    throw std::length_error(fmt::format(
+        "a lattice over {} noises would hold about {:.1g} points for every state, {:.0g} are allowed; splitting takes "
+        "any number of noises",
+        scores, foreseen, most_points));
   const int most = static_cast<int>(std::ceil(reach / spacing));
   std::vector<int> at(scores_, -most);
   for (;;) {

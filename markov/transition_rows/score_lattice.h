@@ -17,6 +17,7 @@ class ScoreLattice {
   /// @param scores   how many a step, >= 1
   /// @param spacing  in (0, 1]
   /// @param reach    radius of the ball, > 0: 8.5 leaves out a probability of 2e-17 for one score
+  /// @throws std::invalid_argument for values outside; std::length_error for more than some 1e7 points
   ScoreLattice(int scores, double spacing, double reach);
   std::size_t size() const { return points_.size() / scores_; }
   /// Writes scores (size() rows) and weights for an offset in [0, 1)^scores, in units of the spacing.
