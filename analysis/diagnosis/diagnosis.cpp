@@ -250,6 +250,7 @@ Fitted fit_models(const TransitionModel& model, const std::vector<const Candidat
   fitted.given_slopes = fit(model, nominal, {}, {.count = {}, .refit_nuisances = true, .most_iterations = 1});
   fitted.given = unfitted(model, nominal);
   fitted.recalibrated = best_fit(model, nominal, {});
+  model.require_own_draws(fitted.recalibrated);
   const auto rank = [&] {
     return rank_causes(model, fitted.recalibrated, candidates,
                        {.threads = options.threads,
@@ -513,6 +514,8 @@ Diagnosis answer(const TransitionModel& model, const Fitted& fitted, const std::
   progress(1, "done");
   d.limits.at_bound = values_at_bound(model, cause);
   d.sentences = sentences(d);
+  if (d.verdict == Verdict::recalibrate)  // It stands behind the verdict.
+    std::ranges::move(model.misstated(fitted.recalibrated), std::inserter(d.sentences, std::next(d.sentences.begin())));
   // A question about the data themselves, as of their unit, stands behind what is made of them.
   const bool named = d.verdict == Verdict::explained || d.verdict == Verdict::partly_explained;
   auto behind =

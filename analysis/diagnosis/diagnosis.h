@@ -224,6 +224,7 @@ struct Diagnosis {
 /// probabilities and a verdict. The same seed gives the same bits. Seconds to minutes: some hundred fits, each of many
 /// evaluations of all events.
 /// @throws std::invalid_argument for options out of range and unknown ids; what options.progress throws
+/// @throws std::runtime_error as TransitionModel::require_own_draws()
 Diagnosis diagnose(const TransitionModel& model, const DiagnosisOptions& options = {});
 
 /// Does the same, with Diagnosis::model in the answer.

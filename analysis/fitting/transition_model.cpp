@@ -80,6 +80,10 @@ std::unique_ptr<TransitionModel> TransitionModel::relaunched(std::uint64_t) cons
 
 std::string TransitionModel::size_in_words(std::span<const EffectTerm>) const { return {}; }
 
+void TransitionModel::require_own_draws(const Fit&) const {}
+
+std::vector<std::string> TransitionModel::misstated(const Fit&) const { return {}; }
+
 std::vector<double> TransitionModel::rest_chances(std::span<const double>, std::span<const EffectTerm>) const {
   return std::vector<double>(events().size(), 0);
 }

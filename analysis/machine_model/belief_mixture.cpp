@@ -121,26 +121,14 @@ double BeliefMixture<Most>::log_mass() const {
   return log_sum(logs);
 }
 
-// Adds the mixture's own mean and covariance as one more part, and scales the weights of the others down.
-template <int Most>
-typename BeliefMixture<Most>::Part& BeliefMixture<Most>::give_way(double share) {
-  Part one = collapsed();
-  one.log_weight = log_mass() + std::log(share);
-  for (Part& part : parts_) part.log_weight += std::log1p(-share);
-  return parts_.emplace_back(std::move(one));
-}
-
 template <int Most>
 void BeliefMixture<Most>::add_wild(double share, double width) {
-  if (share > 0 && !parts_.empty()) give_way(share).width = width;
-}
-
-template <int Most>
-void BeliefMixture<Most>::add_outlier(double share, double width, Eigen::Index states) {
   if (!(share > 0) || parts_.empty()) return;
-  BeliefMatrix<Most>& covariance = give_way(share).covariance;
-  covariance.topRows(states) *= width;
-  covariance.leftCols(states) *= width;
+  Part one = collapsed();
+  one.log_weight = log_mass() + std::log(share);
+  one.width = width;
+  for (Part& part : parts_) part.log_weight += std::log1p(-share);
+  parts_.push_back(std::move(one));
 }
 
 template <int Most>

@@ -61,8 +61,6 @@ class BeliefMixture {
   };
 
   std::vector<Part>& parts() { return parts_; }
-  /// Adds a part of this share in which the state, the first `states` numbers, has `width` times the spread.
-  void add_outlier(double share, double width, Eigen::Index states);
   /// Adds a part of this share with the mixture's own mean and covariance, around which values scatter `width` times as
   /// far and which they do not update. The weights of the other parts are scaled down by the share.
   void add_wild(double share, double width);
@@ -77,7 +75,6 @@ class BeliefMixture {
  private:
   static double updated(Part& part, std::span<const Look<Most>> looks, std::span<const double> values);
   double log_mass() const;
-  Part& give_way(double share);
 
   std::vector<Part> parts_;
 };

@@ -50,8 +50,14 @@ struct BeliefStep<Most>::Cell {
 };
 
 template <int Most>
-BeliefStep<Most>::BeliefStep(MachineStepper& stepper, const ScorePlan& plan, std::size_t shared, bool bent)
-    : stepper_(stepper), lattice_{plan.lattice, {}}, fails_(plan.failing.has_value()), shared_(shared), bent_(bent) {
+BeliefStep<Most>::BeliefStep(MachineStepper& stepper, const ScorePlan& plan, std::size_t shared, bool bent,
+                             double outliers)
+    : stepper_(stepper),
+      lattice_{plan.lattice, {}},
+      fails_(plan.failing.has_value()),
+      shared_(shared),
+      bent_(bent),
+      outliers_(outliers) {
   std::vector<std::size_t>& scores = lattice_.scores;
   if (!scores.empty()) lattice_.axis = lattice_axis(static_cast<int>(scores.size()), bent);
   // Where trials may fail, the map is asked at every point of the lattice: a band of scores at which the machine fails
@@ -242,17 +248,23 @@ typename BeliefStep<Most>::Part BeliefStep<Most>::part(const Slopes& slopes, con
 }
 
 // A cell is cut where its line fails; where its own point failed it takes the next state of the nearest that did not.
+// @param wide  the cell of an outlier's scores, which the outermost points have, too
 template <int Most>
 typename BeliefStep<Most>::Cell BeliefStep<Most>::cell(std::size_t trial, std::size_t point,
-                                                       std::span<const FailureLine<Most>> lines) const {
-  const std::size_t n = lattice_.axis.points.size(), start = lattice_start(trial), at = point % n;
+                                                       std::span<const FailureLine<Most>> lines, bool wide) const {
+  const LatticeAxis& axis = lattice_.axis;
+  const std::size_t n = axis.points.size(), start = lattice_start(trial), at = point % n;
+  const auto everywhere = FailureLine<Most>{}.alive();
   Cell cell{.weight = 1, .anchor = point, .by_score = {}};
   for (std::size_t b = 0, rest = point; b < lattice_.scores.size(); ++b, rest /= n) {
-    cell.weight *= lattice_.axis.weights[rest % n];
-    cell.by_score.push_back({1, lattice_.axis.points[rest % n], lattice_.axis.spread * lattice_.axis.spread});
+    const std::size_t place = rest % n;
+    cell.weight *= (wide ? axis.wide_weights : axis.weights)[place];
+    cell.by_score.push_back(wide && axis.in_tail(place) ? axis.tail(place, everywhere)
+                                                        : CellPart{1, axis.points[place], axis.spread * axis.spread});
   }
   if (lines.empty() || cell.weight < least_weight) return cell;
-  cell.by_score[0] = cell_part(lattice_.axis.points[at], lattice_.axis.spread, lines[point / n].alive());
+  const auto alive = lines[point / n].alive();
+  cell.by_score[0] = wide && axis.in_tail(at) ? axis.tail(at, alive) : cell_part(axis.points[at], axis.spread, alive);
   for (std::size_t away = 1; stepper_.failed(start + cell.anchor) && away < n; ++away) {
     if (at >= away && !stepper_.failed(start + point - away)) cell.anchor = point - away;
     if (at + away < n && !stepper_.failed(start + point + away)) cell.anchor = point + away;
@@ -399,16 +411,28 @@ void BeliefStep<Most>::take_cell(Part& part, std::size_t trial, const Cell& cell
       variance[0] * variance[1] * bend.second[2] * bend.second[2].transpose();
 }
 
+// Makes the straight scores those of an outlier, in a part with all scores of the lattice at zero and in its columns.
 template <int Most>
-void BeliefStep<Most>::on_lattice(AfterStep<Most>& after, std::size_t trial, const Part& belief, const Matrix& root,
-                                  std::span<const FailureLine<Most>> lines, const FailureEdges<Most>& edges) const {
-  const Slopes slope = slopes(trial);
-  const Part common = part(slope, belief, root);
+void BeliefStep<Most>::widen(Part& part, Matrix& columns) const {
+  const Eigen::Index scores = static_cast<Eigen::Index>(straight_.size()),
+                     first = columns.cols() - static_cast<Eigen::Index>(shared_) - scores;
+  auto own = columns.middleCols(first, scores);
+  part.covariance += (outlier_width * outlier_width - 1) * own * own.transpose();
+  own *= outlier_width;
+}
+
+// Adds a part for every cell that goes on, with its weight, and returns the chance of failing.
+// @param common    the step with the scores of the lattice at zero  @param straight  its columns
+// @param wide      the cells are those of an outlier's scores
+template <int Most>
+double BeliefStep<Most>::add_cells(BeliefMixture<Most>& belief, std::size_t trial, const Slopes& slope,
+                                   const Part& common, const Matrix& straight, std::span<const FailureLine<Most>> lines,
+                                   bool wide) const {
   const Vector bent = common.mean.head(states()) - slope.centre;
-  const Matrix straight = columns(slope.first, root);
+  double failed = 0;
   for (std::size_t p = 0; p < lattice_.points(); ++p) {
-    const Cell here = cell(trial, p, lines);
-    after.failed += here.dead;
+    const Cell here = cell(trial, p, lines, wide);
+    failed += here.dead;
     if (here.weight < least_weight) continue;
     Part one = common;
     one.log_weight = std::log(here.weight);
@@ -416,26 +440,61 @@ void BeliefStep<Most>::on_lattice(AfterStep<Most>& after, std::size_t trial, con
     if (pairs() > 0) {
       Matrix there = straight;
       for (std::size_t i = 0; i < pairs(); ++i) {
+        const bool of_score = i >= used_.size();
         const Eigen::Index column =
-            i < used_.size() ? used_[i] : root.cols() + static_cast<Eigen::Index>(i - used_.size());
+            of_score ? straight.cols() - static_cast<Eigen::Index>(shared_ + pairs() - i) : used_[i];
         for (std::size_t b = 0; b < lattice_.scores.size(); ++b)
-          there.col(column).head(states()) +=
-              here.by_score[b].mean * slope.by_score[b].col(static_cast<Eigen::Index>(i));
+          there.col(column).head(states()) += (of_score && wide ? outlier_width : 1) * here.by_score[b].mean *
+                                              slope.by_score[b].col(static_cast<Eigen::Index>(i));
       }
       one.covariance += there * there.transpose() - straight * straight.transpose();
     }
     take_cell(one, trial, here);
-    after.belief.parts().push_back(std::move(one));
+    belief.parts().push_back(std::move(one));
   }
-  if (lines.empty()) return;
+  return failed;
+}
+
+// Steps a belief of a machine without a lattice: all scores are straight.
+template <int Most>
+void BeliefStep<Most>::off_lattice(AfterStep<Most>& after, std::size_t trial, const Part& belief,
+                                   const Matrix& root) const {
+  const Slopes slope = slopes(trial);
+  Part& usual = after.belief.parts().emplace_back(part(slope, belief, root));
+  if (!(outliers_ > 0)) return;
+  usual.log_weight = std::log1p(-outliers_);
+  Part wide = usual;
+  Matrix straight = columns(slope.first, root);
+  widen(wide, straight);
+  wide.log_weight = std::log(outliers_);
+  after.belief.parts().push_back(std::move(wide));
+}
+
+template <int Most>
+void BeliefStep<Most>::on_lattice(AfterStep<Most>& after, std::size_t trial, const Part& belief, const Matrix& root,
+                                  std::span<const FailureLine<Most>> lines, const FailureEdges<Most>& edges) const {
+  const Slopes slope = slopes(trial);
+  Part common = part(slope, belief, root);
+  Matrix straight = columns(slope.first, root);
+  std::vector<Part>& parts = after.belief.parts();
   // The cells are those from the mean state; what they leave to failure is that from all states.
-  const double failed = edges.chance_of_failure(lines), goes_on = std::log1p(-std::min(failed, almost_sure));
-  const double ratio = goes_on - std::log1p(-std::min(after.failed, almost_sure));
-  for (Part& one : after.belief.parts()) one.log_weight += ratio;
-  after.failed = failed;
-  const FailureLine<Most>& middle =
-      lines[lattice_.scores.size() > 1 ? lattice_.axis.points.size() / 2 : 0];  // the other score at zero
-  after.failed_wide = 1 - cell_part(0, outlier_width, middle.alive()).mass;
+  const auto weigh = [&](std::size_t first, double share, double by_cells, double failed) {
+    const double ratio = std::log1p(-std::min(failed, almost_sure)) - std::log1p(-std::min(by_cells, almost_sure));
+    for (std::size_t i = first; i < parts.size(); ++i) parts[i].log_weight += share + ratio;
+  };
+  const double by_cells = add_cells(after.belief, trial, slope, common, straight, lines, false);
+  if (!lines.empty()) {
+    after.failed = edges.chance_of_failure(lines);
+    const FailureLine<Most>& middle =
+        lines[lattice_.scores.size() > 1 ? lattice_.axis.points.size() / 2 : 0];  // the other score at zero
+    after.failed_wide = 1 - cell_part(0, outlier_width, middle.alive()).mass;
+  }
+  weigh(0, std::log1p(-outliers_), by_cells, after.failed);
+  if (!(outliers_ > 0)) return;
+  const std::size_t usual = parts.size();
+  widen(common, straight);
+  const double by_wide_cells = add_cells(after.belief, trial, slope, common, straight, lines, true);
+  weigh(usual, std::log(outliers_), by_wide_cells, after.failed_wide);
 }
 
 template <int Most>
@@ -469,7 +528,7 @@ void BeliefStep<Most>::step(std::span<const TransitionPlace> places, std::span<c
       while (line < lines.size() && lines[line].trial == t) ++line;
       on_lattice(after, t, beliefs[t], left[t], std::span(lines).subspan(first, line - first), edges);
     } else {
-      after.belief.parts().push_back(part(slopes(t), beliefs[t], left[t]));
+      off_lattice(after, t, beliefs[t], left[t]);
     }
     take(t, after);
   }

@@ -33,9 +33,10 @@ class BeliefStep {
   using Matrix = BeliefMatrix<Most>;
   using Part = typename BeliefMixture<Most>::Part;
 
-  /// @param shared  sensors that share errors between rows
-  /// @param bent    parts stay bent in the scores of the lattice, which then are the last numbers of the vector
-  BeliefStep(MachineStepper& stepper, const ScorePlan& plan, std::size_t shared, bool bent);
+  /// @param shared    sensors that share errors between rows
+  /// @param bent      parts stay bent in the scores of the lattice, which then are the last numbers of the vector
+  /// @param outliers  share of steps whose scores are drawn outlier_width times as wide
+  BeliefStep(MachineStepper& stepper, const ScorePlan& plan, std::size_t shared, bool bent, double outliers);
   /// Steps beliefs, all in one or two calls of the machine's map, and hands on what comes of each, in their order.
   /// @param take  is given the number of the belief and its distribution after the step, which it may change
   void step(std::span<const TransitionPlace> places, std::span<const Part> beliefs,
@@ -62,13 +63,17 @@ class BeliefStep {
   Slopes slopes(std::size_t trial) const;
   Matrix columns(const Matrix& slope, const Matrix& root) const;
   Part part(const Slopes& slopes, const Part& belief, const Matrix& root) const;
-  Cell cell(std::size_t trial, std::size_t point, std::span<const FailureLine<Most>> lines) const;
+  Cell cell(std::size_t trial, std::size_t point, std::span<const FailureLine<Most>> lines, bool wide) const;
   struct Bend;
   Bend bend_at(std::size_t trial, const Cell& cell) const;
   void take_cell(Part& part, std::size_t trial, const Cell& cell) const;
   void seek_merged(std::span<const TransitionPlace> places, std::span<const Part> beliefs);
   Matrix turned(const TransitionPlace& place, const Part& belief, Matrix root);
   Eigen::Index bent() const { return bent_ ? static_cast<Eigen::Index>(lattice_.scores.size()) : 0; }
+  void widen(Part& part, Matrix& columns) const;
+  double add_cells(BeliefMixture<Most>& belief, std::size_t trial, const Slopes& slopes, const Part& common,
+                   const Matrix& straight, std::span<const FailureLine<Most>> lines, bool wide) const;
+  void off_lattice(AfterStep<Most>& after, std::size_t trial, const Part& belief, const Matrix& root) const;
   void on_lattice(AfterStep<Most>& after, std::size_t trial, const Part& belief, const Matrix& root,
                   std::span<const FailureLine<Most>> lines, const FailureEdges<Most>& edges) const;
 
@@ -78,6 +83,7 @@ class BeliefStep {
   bool fails_;
   std::size_t shared_;
   bool bent_;
+  double outliers_;
   std::vector<std::size_t> straight_;  // scores that are not on the lattice
   std::vector<Eigen::Index> used_;     // columns of the roots that move points
   std::size_t points_ = 0;             // of a trial

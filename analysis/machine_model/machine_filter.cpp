@@ -192,7 +192,6 @@ typename BeliefMixture<Most>::Part Follower<Most>::see(AfterStep<Most>& after, c
   if (unseen(row)) {
     if (plan_.failing) put(event++, {std::log(std::max(least_chance, 1 - failed)), 0, 1}, failed);
   } else {
-    after.belief.add_outlier(supposed_.outliers, outlier_width, static_cast<Eigen::Index>(stepper_.states()));
     after.belief.add_wild(supposed_.wild, wild_width);
     std::vector<Look<Most>> looks;
     std::vector<double> values;
@@ -224,7 +223,7 @@ Evaluation Follower<Most>::follow(const std::vector<Event>& events, std::vector<
   std::vector<Part> beliefs;
   for (trial_ = 0; trial_ < runs_.trials.size(); ++trial_)
     beliefs.push_back(steps_of(runs_.trials[trial_]) == 0 ? Part{} : begun(runs_.trials[trial_].rows.front()));
-  BeliefStep<Most> stepping(stepper_, plan_, static_cast<std::size_t>(shared_count_), bent_ > 0);
+  BeliefStep<Most> stepping(stepper_, plan_, static_cast<std::size_t>(shared_count_), bent_ > 0, supposed_.outliers);
   for (std::size_t k = 0; k < runs_.longest(); ++k) {
     std::vector<TransitionPlace> places;
     std::vector<Part> before;

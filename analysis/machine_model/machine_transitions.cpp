@@ -22,12 +22,15 @@
 #include "analysis/machine_model/tolerant_starts.h"
 #include "analysis/statistics/falling_order.h"
 #include "analysis/statistics/interval_95.h"
+#include "dynamics/numerics/truncated_normal.h"
 
 namespace metastable::analysis {
 namespace {
 
 constexpr double least_sensor = 1e-6, usual_sensor = 0.1;  // sd of an error that is not stated, in sds of its change
 constexpr double sensor_prior = 3;                         // sd of its logarithm
+constexpr std::size_t enough_levels = 5000;                // of values drawn: chance moves their distribution by 0.01
+constexpr std::uint64_t most_own_draws = 20, own_seed = 0x6f776e;
 constexpr double usual_wild = -7, wild_prior = 1.5, least_wild = -12;  // logit of the share of wild rows
 constexpr double parameter_step = 1e-3;  // of the sd with which it is known, for differences
 // A parameter is refitted within so many of its sds, or within this share of its nominal value where that is wider.
@@ -48,6 +51,8 @@ constexpr std::size_t most_instead = 3;
 constexpr double enough_steps = 30000, enough_failures = 300, few_failures = 10;
 constexpr double most_experiments = 64;  // experiments whose trials are walked at once
 constexpr std::uint64_t seeds_apart = 0x9E3779B97F4A7C15;
+
+bool is_outliers(const EffectTerm& term) { return term.candidate->id == "outliers"; }
 
 double share_of(double logit) { return 1 / (1 + std::exp(-logit)); }
 
@@ -117,6 +122,13 @@ class MachineTransitions : public TransitionModel {
     for (FitStart& start : all)  // the share of wild rows is the last nuisance
       for (std::size_t slot = start.nuisance.size(); slot < nuisances_.size(); ++slot)
         start.nuisance.push_back(nuisances_[slot].nominal);
+    // A few outliers make the score of their share at none as large as they are rare under the model: it promises next
+    // to nothing, and a recalibration takes them for a wider noise.
+    if (std::ranges::any_of(terms, is_outliers)) {
+      FitStart& start = all.emplace_back(FitStart{nominal_values(*this), {}, false});
+      for (const EffectTerm& term : terms)
+        start.values.push_back(is_outliers(term) ? std::vector{term.candidate->parameters[0].try_at} : term.values);
+    }
     return all;
   }
   std::vector<double> rest_chances(std::span<const double> nuisance, std::span<const EffectTerm> terms) const override {
@@ -153,10 +165,13 @@ class MachineTransitions : public TransitionModel {
                         std::uint64_t seed) const override;
   const std::vector<std::string>& notes() const override { return notes_; }
   std::vector<NamedValue> report_nuisances(std::span<const double> nuisance) const override;
+  std::vector<std::string> misstated(const Fit& recalibrated) const override;
+  void require_own_draws(const Fit& recalibrated) const override;
 
   std::unique_ptr<MachineTransitions> with_wide_priors() const;
   bool effect_speaks_for_what_is_stated(const Fit& recalibrated, const Fit& wide) const;
   void set_aside_what_is_misstated();
+  std::vector<double> levels_of_own_draws(const std::vector<double>& nuisance) const;
   std::vector<std::string> effects_instead(const Fit& recalibrated) const;
 
  private:
@@ -401,6 +416,41 @@ void MachineTransitions::set_aside_what_is_misstated() {
   for (const std::size_t one : slots) nuisances_[one].misstated = 1;
 }
 
+// Returns, in ascending order, the levels of the measured values of runs drawn from the model: the share of values
+// below each, of those of rows that go on. They are uniform where the likelihood is that of what is drawn.
+std::vector<double> MachineTransitions::levels_of_own_draws(const std::vector<double>& nuisance) const {
+  std::vector<double> levels;
+  for (std::uint64_t draw = 0; draw < most_own_draws && levels.size() < enough_levels; ++draw) {
+    const auto own = drawn(runs_, nuisance, {}, own_seed + draw, Launches::stated);
+    std::vector<double> failed;
+    const Evaluation there =
+        follow_machine(*machine_, own->runs_, own->plan_, own->events_, hypothesis(nuisance, {}), &failed);
+    for (std::size_t e = 0; e < own->events_.size(); ++e)
+      if (own->events_[e].kind == EventKind::step && failed[e] < 1)
+        levels.push_back((dynamics::normal_cdf(there.score[e]) - failed[e]) / (1 - failed[e]));
+  }
+  std::ranges::sort(levels);
+  return levels;
+}
+
+void MachineTransitions::require_own_draws(const Fit& recalibrated) const {
+  const std::vector<double> levels = levels_of_own_draws(recalibrated.nuisance);
+  const auto count = static_cast<double>(levels.size());
+  double apart = 0;  // Kolmogorov's distance
+  for (std::size_t i = 0; i < levels.size(); ++i)
+    apart = std::max({apart, std::abs(levels[i] - static_cast<double>(i) / count),
+                      std::abs(levels[i] - static_cast<double>(i + 1) / count)});
+  const Rules rules;
+  if (apart < rules.own_draws_apart || apart * std::sqrt(static_cast<double>(events_.size())) < rules.own_draws_shown)
+    return;
+  throw std::runtime_error(fmt::format(
+      "step: rows that it draws itself are not distributed as its likelihood says (distribution functions "
+      "differ by {:.2g}, {:.2g} is allowed), so that effects would be named that are not there. A step that "
+      "jumps, folds, saturates or has a kink in its noise does that: each noise has to move the next state smoothly "
+      "and one way",
+      apart, rules.own_draws_apart));
+}
+
 // Lists the suspected effects, with their sizes, with which the runs are about as likely while all parameters stay near
 // where they are stated.
 std::vector<std::string> MachineTransitions::effects_instead(const Fit& recalibrated) const {
@@ -422,28 +472,27 @@ std::vector<std::string> MachineTransitions::effects_instead(const Fit& recalibr
   return all;
 }
 
-}  // namespace
-
-std::vector<std::string> misstated_parameters(const TransitionModel& model) {
-  const Fit recalibrated = best_fit(model, nominal_values(model), {});
-  const std::vector<std::size_t> slots = misstated_slots(model, recalibrated.nuisance);
+std::vector<std::string> MachineTransitions::misstated(const Fit& recalibrated) const {
+  const std::vector<std::size_t> slots = misstated_slots(*this, recalibrated.nuisance);
   if (slots.empty()) return {};
   const Eigen::MatrixXd root = resolved_root(recalibrated.information);
   std::vector<std::string> far;
   for (const std::size_t slot : slots) {
-    const Nuisance& stated = model.nuisances()[slot];
+    const Nuisance& stated = nuisances_[slot];
     const double value = recalibrated.nuisance[slot];
     const double half = normal_90 * root.row(static_cast<Eigen::Index>(slot)).norm();
     far.push_back(fmt::format("{} is {:.4g} (90 %: {:.4g} to {:.4g}), {:.2g} of its stated sds from {:.4g}",
                               stated.name, value, value - half, value + half, sds_off(stated, value), stated.nominal));
   }
-  const std::vector<std::string> other = dynamic_cast<const MachineTransitions&>(model).effects_instead(recalibrated);
+  const std::vector<std::string> other = effects_instead(recalibrated);
   return {fmt::format("{}: known less well than stated{}.", fmt::join(far, "; "),
                       other.empty()
                           ? ""
                           : fmt::format(", unless an effect is at work that these data do not tell from it: {}",
                                         fmt::join(other, ", ")))};
 }
+
+}  // namespace
 
 std::unique_ptr<TransitionModel> machine_transitions(std::shared_ptr<const Machine> machine, MachineRuns runs) {
   auto model = std::make_unique<MachineTransitions>(refusing_nan(std::move(machine)), std::move(runs));

@@ -53,15 +53,10 @@ namespace metastable::analysis {
 /// the errors of sensors whose sd is not stated, and the share of wild rows. Effects are those of machine_effects().
 /// The map is called with many states at once, from several threads at once. A stated parameter that a recalibration
 /// leaves beyond three of its sds is known less well than stated: what is stated of it is set aside, unless an effect
-/// makes the runs likelier with the parameter as stated.
+/// makes the runs likelier with the parameter as stated. TransitionModel::misstated() names it, and the suspected
+/// effects that would do as well with all parameters as stated, which it fits.
 /// @throws std::invalid_argument as Machine::require_valid(), look_over(), score_plan(); where a measured state has
 ///   neither noise nor an error of measurement; here and in every later call as the step of refusing_nan()
 std::unique_ptr<TransitionModel> machine_transitions(std::shared_ptr<const Machine> machine, MachineRuns runs);
-
-/// Says of a model that a recalibration suits which parameters then lie beyond three of their stated sds from where
-/// they are stated, and which suspected effects would do as well with all parameters as stated. A sentence, or none. It
-/// fits the model anew, and once more for each suspected effect.
-/// @param model  of machine_transitions()
-std::vector<std::string> misstated_parameters(const TransitionModel& model);
 
 }  // namespace metastable::analysis

@@ -6,6 +6,7 @@
 #include <iterator>
 #include <numbers>
 
+#include "analysis/machine_model/machine_hypothesis.h"
 #include "dynamics/numerics/truncated_normal.h"
 
 namespace metastable::analysis {
@@ -25,6 +26,22 @@ constexpr std::size_t wide_gap = 4;  // The map is asked in the middle of gaps o
 constexpr double told_share = 1e-4;  // A polynomial may be off by this share of the move in a unit of the score,
 constexpr double told_width = 8;     //   weighed by exp(-z^2 / told_width) at the score z,
 constexpr double told_rounding = 1e-12;  //   or by this share of the largest value.
+
+// Returns where the upper tail of an outlier's score begins.
+double tail_begin(const LatticeAxis& axis) { return axis.points.back() - 0.5 * axis.spacing; }
+
+std::vector<double> wide_weights(const LatticeAxis& axis) {
+  const double sd = std::sqrt(outlier_width * outlier_width - axis.spread * axis.spread);
+  std::vector<double> weights;
+  double sum = 0;
+  for (std::size_t i = 0; i < axis.points.size(); ++i) {
+    weights.push_back(axis.in_tail(i) ? dynamics::normal_cdf(-tail_begin(axis) / outlier_width)
+                                      : axis.spacing / sd * dynamics::normal_density(axis.points[i] / sd));
+    sum += weights.back();
+  }
+  for (double& weight : weights) weight /= sum;
+  return weights;
+}
 
 }  // namespace
 
@@ -46,7 +63,20 @@ LatticeAxis lattice_axis(int axes, bool bent) {
   }
   for (double& weight : axis.weights) weight /= sum;
   for (double& share : axis.shares) share /= whole;
+  axis.wide_weights = wide_weights(axis);
   return axis;
+}
+
+CellPart LatticeAxis::tail(std::size_t point, std::span<const std::pair<double, double>> inside) const {
+  const double begin = tail_begin(*this);
+  std::vector<std::pair<double, double>> clipped;
+  for (auto [from, to] : inside) {
+    (point == 0 ? to : from) = point == 0 ? std::min(to, -begin) : std::max(from, begin);
+    if (from < to) clipped.emplace_back(from, to);
+  }
+  CellPart part = cell_part(0, outlier_width, clipped);
+  part.mass /= dynamics::normal_cdf(-begin / outlier_width);
+  return part;
 }
 
 // The basis of Chebyshev's polynomials on the axis keeps the equations for the nodes well conditioned.

@@ -10,6 +10,13 @@
 
 namespace metastable::analysis {
 
+/// The part of a cell, N(centre, spread^2), inside some intervals.
+struct CellPart {
+  double mass = 1, mean = 0, variance = 0;
+};
+/// @param inside  intervals, ascending
+CellPart cell_part(double centre, double spread, std::span<const std::pair<double, double>> inside);
+
 /// One axis of a lattice: the standard normal as a mixture of normals of sd `spread` at equal distances, exact to 1e-4
 /// of its density out to five sds. The first and last points serve for slopes only.
 struct LatticeAxis {
@@ -17,6 +24,14 @@ struct LatticeAxis {
   std::vector<double> points;   ///< ascending
   std::vector<double> weights;  ///< of the cells, 0 for the first and the last; they add up to 1
   std::vector<double> shares;   ///< of the points, by which a mean over the standard normal is taken; they add up to 1
+  /// Of the cells, for the score of an outlier, N(0, outlier_width^2); the first and the last stand for the tails, all
+  /// that lies beyond the other cells. They add up to 1.
+  std::vector<double> wide_weights;
+
+  bool in_tail(std::size_t point) const { return point == 0 || point + 1 == points.size(); }
+  /// Returns the part of an outlier's score that lies in the tail of the first or the last point and inside some
+  /// intervals, ascending; its mass is that share of the tail's.
+  CellPart tail(std::size_t point, std::span<const std::pair<double, double>> inside) const;
 };
 
 /// @param axes  of the lattice, 1 or 2: cells of two are wider
@@ -67,12 +82,5 @@ struct ScoreLattice {
     return fresh;
   }
 };
-
-/// The part of a cell, N(centre, spread^2), inside some intervals.
-struct CellPart {
-  double mass = 1, mean = 0, variance = 0;
-};
-/// @param inside  intervals, ascending
-CellPart cell_part(double centre, double spread, std::span<const std::pair<double, double>> inside);
 
 }  // namespace metastable::analysis

@@ -71,7 +71,8 @@ void look(Told& told, const MachineStepper& stepper, std::size_t first, const st
     double slope = 0;
     for (std::size_t m = 0; m < scores; ++m) {
       const std::size_t pair = first + 1 + 4 * m;
-      if (lives(pair) && lives(pair + 1)) slope += std::abs(at(pair, s) - at(pair + 1, s));
+      if (lives(pair) && lives(pair + 1))  // Both sides move alike where the map folds in a score.
+        slope += std::abs(at(pair, s) - centre) + std::abs(at(pair + 1, s) - centre);
     }
     if (!(slope > 1e-9 * scale[s])) continue;
     std::size_t point = cross;

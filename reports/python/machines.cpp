@@ -171,9 +171,6 @@ py::dict diagnose_machine(const py::dict& machine_fields, const py::dict& runs_f
     std::shared_ptr<const analysis::TransitionModel> model = analysis::machine_transitions(machine, std::move(runs));
     analysis::require_effects(study.catalogue, model->effect_ids());
     found = analysis::diagnose(model, study);
-    if (found.verdict == analysis::Verdict::recalibrate)  // what it says stands behind the verdict
-      std::ranges::move(analysis::misstated_parameters(*model),
-                        std::inserter(found.sentences, std::next(found.sentences.begin())));
     figures = notebook_figures(found);
   });
   found.model.reset();  // its map asks through this call

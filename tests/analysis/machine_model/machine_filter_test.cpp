@@ -157,6 +157,61 @@ TEST(MachineFilter, ScoresOfASkewedLandingAreNormal) {
   }
 }
 
+// Returns the density of the score z of a step that is an outlier with this probability.
+double outlier_density(double z, double share) {
+  return (1 - share) * dynamics::normal_density(z) +
+         share * dynamics::normal_density(z / outlier_width) / outlier_width;
+}
+
+// An outlier's noise is wide, not the belief of the state before it: of the second row, given the first and its error.
+TEST(MachineFilter, OutliersOfALinearMachineHaveTheirLikelihood) {
+  const double error = 0.3, share = 0.1;
+  const Machine machine = linear_machine(error);
+  const MachineRuns runs =
+      scalar_runs(50, 2, 1.5, error, 3, [](double x, double z, std::size_t) { return 0.8 * x + 0.3 + 0.4 * z; });
+  MachineHypothesis h = nominal_of(machine);
+  h.outliers = share;
+  const Evaluation evaluation = followed(machine, runs, h);
+  for (std::size_t t = 0; t < runs.trials.size(); ++t) {
+    const double off = runs.trials[t].rows[1].seen[0] - 0.8 * runs.trials[t].rows[0].seen[0] - 0.3;
+    double density = 0;
+    for (const auto& [weight, sd] : {std::pair{1 - share, 0.2}, {share, 0.2 * outlier_width}}) {
+      const double spread = std::hypot(sd, error * std::hypot(1, 0.8));
+      density += weight * dynamics::normal_density(off / spread) / spread;
+    }
+    EXPECT_NEAR(evaluation.log_density[t], std::log(density), 1e-6) << t;
+  }
+}
+
+// The map bends in an outlier's noise: x' = x / 2 + exp(z / 8) shows each z, which reaches the tails of the lattice.
+TEST(MachineFilter, OutliersWhereTheMapBendsHaveTheirLikelihood) {
+  const double share = 0.1;
+  for (const double edge : {100.0, 9.0}) {  // above which the machine fails
+    Machine machine = skewed_machine(0);
+    machine.step = [edge](const MachineBatch& batch) {
+      for (std::size_t i = 0; i < batch.rows; ++i) {
+        batch.next[i] = batch.values[0][0] * batch.states[i] + std::exp(batch.scores[i] / 8);
+        batch.failed[i] = batch.scores[i] > edge;
+      }
+    };
+    std::mt19937_64 generator(12);
+    std::uniform_real_distribution<double> uniform;
+    double exact = 0;
+    std::vector<double> scores;
+    const MachineRuns runs = scalar_runs(100, 11, 2.0, 0, 5, [&](double x, double z, std::size_t) {
+      if (uniform(generator) < share) z *= outlier_width;
+      z = std::min(z, 8.9);
+      scores.push_back(z);
+      exact += std::log(outlier_density(z, share) * 8 * std::exp(-z / 8));
+      return x / 2 + std::exp(z / 8);
+    });
+    EXPECT_GT(std::ranges::count_if(scores, [](double z) { return std::abs(z) > 5; }), 10);
+    MachineHypothesis h = nominal_of(machine);
+    h.outliers = share;
+    EXPECT_NEAR(followed(machine, runs, h).total(), exact, 1) << edge;
+  }
+}
+
 // Two columns that the same two noises move along one curve, as the speeds before and after a collision are moved: the
 // second, given the first, is known to the error of its measurement.
 TEST(MachineFilter, ScoresOfColumnsThatBendTogetherAreNormal) {
