@@ -6,6 +6,7 @@
 #include <tuple>
 
 #include "analysis/diagnosis/at_work.h"
+#include "analysis/statistics/interval_95.h"
 
 namespace metastable::analysis {
 namespace {
@@ -80,6 +81,16 @@ void count_kind(AtWorkTally& tally, const BlindTruth& truth, const Answer& answe
   }
 }
 
+// Says whether an interval holds what the laboratory counted, which chance moves as well: the interval and the count
+// may differ by as much as both leave open together, on the scale of ratios.
+bool holds_counted(const std::pair<double, double>& interval, const BlindTruth& truth) {
+  const auto [lower, upper] = interval;
+  const double steps = truth.collisions_counted / truth.rests_counted;
+  if (!std::isfinite(upper) || !(lower > 0)) return lower <= steps && steps <= upper;
+  const double half = 0.5 * std::log(upper / lower), by_count = normal_90 / std::sqrt(truth.rests_counted);
+  return std::abs(std::log(steps / std::sqrt(lower * upper))) <= std::hypot(half, by_count);
+}
+
 }  // namespace
 
 std::vector<Grade> steps_grades(const std::vector<BlindTruth>& truths, const std::vector<Answer>& answers) {
@@ -88,8 +99,7 @@ std::vector<Grade> steps_grades(const std::vector<BlindTruth>& truths, const std
     const BlindTruth& truth = truths[i];
     if (!answers[i] || !answers[i]->steps || truth.rests_counted < enough_rests) continue;
     const auto [lower, upper] = *answers[i]->steps;
-    const double steps = truth.collisions_counted / truth.rests_counted;
-    held.count(lower <= steps && steps <= upper);
+    held.count(holds_counted(*answers[i]->steps, truth));
     const auto& counted = answers[i]->steps_counted;
     const bool outside = truth.kind == BlindKind::outside || truth.kind == BlindKind::mixed;
     if (counted && std::isfinite(counted->second) && !outside)

@@ -20,8 +20,9 @@ std::vector<Grade> at_work_grades(const std::vector<BlindTruth>& truths,
 std::vector<Grade> share_grades(const std::vector<BlindTruth>& truths,
                                 const std::vector<std::optional<BlindAnswer>>& answers);
 
-/// Says how often the interval of the machine's expected steps holds what the laboratory counts, and how often it is as
-/// narrow as that of counting twice the trials. Cases without an interval, or with too few rests counted, are left out.
+/// Says how often the interval of the machine's expected steps holds what the laboratory counts, with the error of that
+/// count, and how often it is as narrow as that of counting twice the trials. Cases without an interval, or with too
+/// few rests counted, are left out.
 std::vector<Grade> steps_grades(const std::vector<BlindTruth>& truths,
                                 const std::vector<std::optional<BlindAnswer>>& answers);
 
