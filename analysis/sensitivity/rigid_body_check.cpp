@@ -105,18 +105,20 @@ const BesideRigidBodies& farthest(const std::vector<const BesideRigidBodies*>& a
 }
 
 std::string trust_text(dynamics::Law law) {
-  return fmt::format("trust settled for a real wheel, {} for comparing with the paper", dynamics::law_name(law));
+  return fmt::format("trust settled for a real wheel, and {} only to compare with the paper", dynamics::law_name(law));
 }
 
 std::string alone_text(const BesideRigidBodies& one, dynamics::Law law) {
   std::string text = fmt::format("rigid bodies (law settled) take {} steps", rigid_body_steps_text(one.check));
   switch (one.verdict()) {
     case RigidBodyVerdict::within_twice:
-      return text + ", within twice of that";
+      return text + ", within a factor of two of that";
     case RigidBodyVerdict::differs:
       return text + fmt::format(", {}: {}", times_text(one), trust_text(law));
     case RigidBodyVerdict::open:
-      return text + "; the wheels rolled do not tell whether that is within twice, a study under law settled does";
+      return text +
+             "; the wheels simulated do not tell whether that is within a factor of two, a study under law settled "
+             "does";
   }
   throw std::logic_error("unknown verdict");
 }
@@ -140,17 +142,16 @@ std::string several_text(const std::vector<const BesideRigidBodies*>& known, dyn
   }
   if (!differ.empty()) {
     const BesideRigidBodies& most = farthest(differ);
-    return fmt::format("rigid bodies (law settled) differ by more than twice in {} of {}, most at {}, {} steps, {}: {}",
-                       differ.size(), known.size(), most.name, rigid_body_steps_text(most.check), times_text(most),
-                       trust_text(law));
+    return fmt::format(
+        "rigid bodies (law settled) differ by more than a factor of two in {} of {}, most at {}, {} steps, {}: {}",
+        differ.size(), known.size(), most.name, rigid_body_steps_text(most.check), times_text(most), trust_text(law));
   }
   if (!open.empty())
     return fmt::format(
-        "whether rigid bodies (law settled) are within twice of it the wheels rolled do not tell in {} of {}, as at "
-        "{}: "
-        "{} steps; studies under law settled do",
+        "the wheels simulated do not tell in {} of {} whether rigid bodies (law settled) are within a factor of two of "
+        "it, as at {}: {} steps; studies under law settled do",
         open.size(), known.size(), open.front()->name, rigid_body_steps_text(open.front()->check));
-  return fmt::format("rigid bodies (law settled) are within twice of it in all {}", known.size());
+  return fmt::format("rigid bodies (law settled) are within a factor of two of it in all {}", known.size());
 }
 
 }  // namespace
@@ -244,7 +245,7 @@ std::string rigid_body_sentence(std::span<const BesideRigidBodies> all, dynamics
   std::vector<const BesideRigidBodies*> known;
   for (const BesideRigidBodies& one : all)
     if (one.check.reason.empty()) known.push_back(&one);
-  const std::string head = fmt::format("The law is {}, as none was named; ", dynamics::law_name(law));
+  const std::string head = fmt::format("No law was named, so the answer is that of {}; ", dynamics::law_name(law));
   if (known.empty())
     return head + fmt::format("that of rigid bodies (settled) has no answer: {}.",
                               all.empty() ? "it knows no such wheel" : all.front().check.reason);

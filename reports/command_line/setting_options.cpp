@@ -133,7 +133,8 @@ void add_wheel(Options& options) {
 void add_stated_contact(Options& options) {
   options.group("Contacts and their law");
   options.add("law", "published|coulomb|plastic|settled", "published", "Contact law");
-  options.add("restitution", "MEAN,SD", "0.4,0.1", "eta, normal truncated to [0, 1]; SD 0 or MEAN alone: constant",
+  options.add("restitution", "MEAN,SD", "0.4,0.1",
+              "eta, normal truncated to [0, 1] ([0, 0.95] under settled); SD 0 or MEAN alone: constant",
               range::restitution);
   options.add("friction", "MEAN,SD", "0.4,0.1", "mu, normal truncated to [0, inf)", range::friction);
 }

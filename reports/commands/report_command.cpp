@@ -248,17 +248,17 @@ class Report {
         if (const std::string says = first ? sensitivity_sentence(one) : ""; !says.empty())
           reading +=
               fmt::format("Under {} on {} deg {}. ", dynamics::law_name(one.setting.law), one.setting.slope_deg, says);
-        const std::string id = slope_id(fmt::format("hangs-on-{}", dynamics::law_name(one.setting.law)), one.setting);
+        const std::string id = slope_id(fmt::format("depends-on-{}", dynamics::law_name(one.setting.law)), one.setting);
         (first ? main : others).push_back(sensitivity_figure(id, one, provenance_for({one.setting})));
         first = false;
       }
       std::vector<analysis::Setting> settings;
       for (const Hanging& one : found) settings.push_back(one.setting);
-      tables.push_back(sensitivity_table(slope_id("hangs-on", setting), found, provenance_for(settings)));
+      tables.push_back(sensitivity_table(slope_id("depends-on", setting), found, provenance_for(settings)));
     }
     std::erase_if(tables, [](const Table& table) { return table.rows.empty(); });
     if (main.empty()) return;
-    pages_.section("hangs-on", "What it hangs on", reading + "Whiskers are numerical, 95 %.", main, {},
+    pages_.section("depends-on", "What it depends on", reading + "Whiskers are numerical, 95 %.", main, {},
                    {{"All parameters in numbers, and the other law", {}, std::move(others), std::move(tables)}});
   }
 

@@ -243,7 +243,7 @@ Table sensitivity_table(const std::string& id, const std::vector<Hanging>& laws,
   table.columns = {{"one per cent more"}, {"value", "", NumberFormat::general, 4}, {"unit"}};
   std::vector<std::string> names;
   for (const Hanging& one : laws) {
-    table.title = fmt::format("What the expected steps hang on at {} deg, by law", one.setting.slope_deg);
+    table.title = fmt::format("What the expected steps depend on at {} deg, by law", one.setting.slope_deg);
     table.columns.push_back({fmt::format("steps under {}", dynamics::law_name(one.setting.law)), "%"});
     for (const analysis::Sensitivity& s : one.sensitivities.ranked) {
       const std::string name = s.leg ? sensitivity_name(s) : std::string(analysis::parameter_label(s.parameter));

@@ -36,15 +36,15 @@ std::string rests_text(const std::vector<Studied>& studies);
 /// Says how each study was obtained: status, cells, draws, and what its interval holds.
 Table resolution_table(const std::vector<Studied>& studies, const Provenance& provenance);
 
-/// Holds what the expected steps of one setting hang on.
+/// Holds what the expected steps of one setting depend on.
 struct Hanging {
   analysis::Setting setting;
   analysis::Sensitivities sensitivities;
 };
 /// Lists what one per cent more of each parameter does to the steps: parameters down, laws across, one ramp.
 Table sensitivity_table(const std::string& id, const std::vector<Hanging>& laws, const Provenance& provenance);
-/// Says which two parameters the steps hang on most, of those whose effect has a sure sign: "1 % more mean of friction
-/// μ makes 7.3 % more steps, 1 % more ..."; "" where there is none.
+/// Says which two parameters the steps depend on most, of those whose effect has a sure sign: "1 % more mean of
+/// friction μ makes 7.3 % more steps, 1 % more ..."; "" where there is none.
 std::string sensitivity_sentence(const Hanging& one);
 /// Returns by how many per cent the steps grow for 1 % more of the parameter, with the interval of its error.
 Estimate for_one_per_cent(const analysis::Sensitivity& one);

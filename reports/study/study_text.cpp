@@ -55,6 +55,17 @@ constexpr Word until_failure[] = {
     {"worst start", "the slowest speed with which a step can end and the wheel roll on",
      "Expected steps from there are the fewest that a rolling wheel has."},
     {"relaunched", "the long-run mean if every wheel that rests is launched again at once", ""}};
+constexpr Word of_the_chain[] = {
+    {"quasi-stationary speed", "mean and sd of the speed in the metastable regime, just after a collision", ""},
+    {"eigenvalue moduli", "shares that are left of differences between two wheels after a step, the largest first",
+     "The first is the share of rolling wheels in the metastable regime that a step leaves rolling."},
+    {"mixing", "how many steps it takes until the launch is forgotten",
+     "Spectral: the steps in which differences fade by a factor of e. Total variation: the steps from this launch "
+     "until "
+     "its distribution of speeds is within 0.05 of that of the regime."},
+    {"resolution", "how finely the speeds are cut, and how many contacts are drawn", ""},
+    {"relative error", "the two parts of the interval, as shares of the expected steps",
+     "Discretization is the part of the cells, sampling that of the draws."}};
 constexpr Word assumptions[] = {
     {"foot lifts", "too fast for gravity alone to hold the standing foot on the ramp",
      "The model holds it there. Where this is frequent, real wheels hop and the numbers are the model's alone."},
@@ -172,8 +183,11 @@ std::string words_text(const analysis::Metastability& study, bool more, std::siz
     if (more && *word.more != '\0') text += wrapped(word.more, "    ", width);
   };
   for (const Word& word : always) say(word);
-  if (study.status != analysis::Status::rest_unreachable)
+  if (study.status != analysis::Status::rest_unreachable) {
     for (const Word& word : until_failure) say(word);
+    if (more && study.method != analysis::Method::followed)
+      for (const Word& word : of_the_chain) say(word);
+  }
   for (const analysis::ViolationShare& share : study.violations)
     for (const Word& word : assumptions)
       if (share.name == word.name) say(word);

@@ -105,7 +105,8 @@ TEST(RigidBodyCheck, SaysWhyThereIsNone) {
   EXPECT_EQ(check.reason, "restitution: mean 0.97 is outside [0, 0.95], the range of law settled");
   EXPECT_EQ(check.wheels, 0U);
   EXPECT_EQ(rigid_body_sentence(std::vector{BesideRigidBodies{"", {1, 1, 1}, check}}, setting.law),
-            "The law is published, as none was named; that of rigid bodies (settled) has no answer: restitution: mean "
+            "No law was named, so the answer is that of published; that of rigid bodies (settled) has no answer: "
+            "restitution: mean "
             "0.97 is outside [0, 0.95], the range of law settled.");
 }
 
@@ -135,11 +136,13 @@ TEST(RigidBodyCheck, SentencesNameTheLawAndWhichToTrust) {
     return rigid_body_sentence(all, dynamics::Law::published);
   };
   EXPECT_EQ(said({beside("", {1.2, 1.19, 1.21}, {900, 700, 1200})}),
-            "The law is published, as none was named; rigid bodies (law settled) take 900 (95 % interval 700 to 1200) "
-            "steps, 750 times as many: trust settled for a real wheel, published for comparing with the paper.");
+            "No law was named, so the answer is that of published; rigid bodies (law settled) take 900 (95 % interval "
+            "700 to 1200) "
+            "steps, 750 times as many: trust settled for a real wheel, and published only to compare with the paper.");
   EXPECT_EQ(said({beside("", {6, 5.9, 6.1}, {6.1, 5.8, 6.7})}),
-            "The law is published, as none was named; rigid bodies (law settled) take 6.1 (95 % interval 5.8 to 6.7) "
-            "steps, within twice of that.");
+            "No law was named, so the answer is that of published; rigid bodies (law settled) take 6.1 (95 % interval "
+            "5.8 to 6.7) "
+            "steps, within a factor of two of that.");
   EXPECT_NE(said({beside("", {44800, 44600, 45000}, {20000, 20000, infinite}, true)}).find("do not tell"),
             std::string::npos);
   // Rubber feet on the steeper ramp: more friction is fewer steps under the one law, more under the other.
@@ -150,7 +153,8 @@ TEST(RigidBodyCheck, SentencesNameTheLawAndWhichToTrust) {
   // In the same direction, but by more than twice at one of them.
   const std::vector<BesideRigidBodies> apart{beside("7 deg", {6, 5.9, 6.1}, {7, 6.8, 7.2}),
                                              beside("9 deg", {60, 59, 61}, {200, 190, 210})};
-  EXPECT_NE(said(apart).find("differ by more than twice in 1 of 2, most at 9 deg"), std::string::npos) << said(apart);
+  EXPECT_NE(said(apart).find("differ by more than a factor of two in 1 of 2, most at 9 deg"), std::string::npos)
+      << said(apart);
   for (const auto& all : {rubber, apart}) EXPECT_EQ(said(all).find('\n'), std::string::npos);
 }
 

@@ -141,7 +141,7 @@ TEST(ReportTables, SensitivitiesStandSideBySideAndOnlySureOnesAreTold) {
   const Hanging published{setting, {{{P::friction_mean, {}, 0.4, -12, 0.1}, {P::leg_length, 3, 0.15, 2, 0.1}}, ""}};
   EXPECT_EQ(sensitivity_sentence(settled),
             "1 % more mean of friction μ makes 7.3 % more steps, 1 % more sd of friction μ makes 1.8 % fewer steps");
-  const Table table = sensitivity_table("hangs-on", {settled, published}, {});
+  const Table table = sensitivity_table("depends-on", {settled, published}, {});
   expect_rectangular(table);
   ASSERT_EQ(table.rows.size(), 4u);
   expect_cell(at(table, 0, "value"), 0.4);
