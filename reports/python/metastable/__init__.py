@@ -703,7 +703,7 @@ def walker(step, dimension, noise, *, start, names=(), noise_names=(), phases=1,
     noise        numbers of noise a step, 1 to 16
     start        the state that walks begin from, at phase 0: expected steps are counted from it. The orbit that the map
                  settles into without noise, the gait, is what meshes are centred on and the answer tells (`gait`);
-                 expected steps from the metastable regime, `expected_steps.from_quasi_stationary`, do not hang on it
+                 expected steps from the metastable regime, `expected_steps.from_quasi_stationary`, do not depend on it
     names        of the numbers of a state, with units; noise_names likewise
     phases       events after which the map repeats itself
     angles       numbers of the state that are angles [rad], by name or place: they are counted within pi of the
