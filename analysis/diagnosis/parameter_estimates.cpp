@@ -14,6 +14,7 @@
 namespace metastable::analysis {
 namespace {
 
+constexpr double surely_there = 6;     // gain of an effect whose interval does not hold none of it
 constexpr double least_weight = 1e-3;  // of a variant, to widen an interval
 
 std::vector<EstimatedParameter> as_reported(const EffectTerm& term) {
@@ -64,6 +65,21 @@ std::vector<EstimatedParameter> estimates(const EffectTerm& term, const Eigen::M
     all[k].fitted = half > 0;
   }
   return all;
+}
+
+// Returns the interval of an effect of one value, as far as its curvature or its likelihood reach. Where the curvature
+// says too much (at a jump of the map) the likelihood is wider. Towards none of the effect the likelihood alone counts
+// if nothing lies on the other side, as of a spread, and where the curvature says nothing (of a foot that always
+// sticks), so that it would hold the neutral value which the gain excludes.
+std::pair<double, double> effect_ends(const TransitionModel& model, const RankedCause& ranked, const EffectTerm& term,
+                                      const Eigen::MatrixXd& covariance, Eigen::Index slot) {
+  const FreeParameter& p = term.candidate->parameters[0];
+  const double value = term.values[0], half = normal_90 * std::sqrt(std::max(0.0, covariance(slot, slot)));
+  const auto [low, high] = likelihood_ends(model, ranked.fit, covariance, slot);
+  const bool there = ranked.terms.size() == 1 && ranked.gain > surely_there && std::abs(value - p.neutral) < half;
+  const bool alone_below = p.neutral <= p.lower || (there && p.neutral < value),
+             alone_above = p.neutral >= p.upper || (there && p.neutral > value);
+  return {alone_below ? low : std::min(low, value - half), alone_above ? high : std::max(high, value + half)};
 }
 
 // Holds what one of an effect's variants says of its numbers.
@@ -124,14 +140,16 @@ void cover_variants(const RankedCause& ranked, const EffectScan& scan, std::vect
     }
 }
 
-// Returns the 90 % interval of a nuisance, by chance and by what errors of the model's form move it.
+// Returns the 90 % interval of a nuisance, by chance, as far as its curvature or its likelihood reach, and by what
+// errors of the model's form move it.
 std::pair<double, double> nuisance_ends(const TransitionModel& model, const Fit& fit, const Eigen::MatrixXd& covariance,
                                         Eigen::Index slot) {
   const Nuisance& n = model.nuisances()[static_cast<std::size_t>(slot)];
-  const double here = fit.nuisance[static_cast<std::size_t>(slot)], form = normal_90 * n.form_sd;
+  const double here = fit.nuisance[static_cast<std::size_t>(slot)], form = normal_90 * n.form_sd,
+               half = normal_90 * std::sqrt(std::max(0.0, covariance(slot, slot)));
   const auto [low, high] = likelihood_ends(model, fit, covariance, slot);
-  return {std::clamp(here - std::hypot(here - low, form), n.lower, n.upper),
-          std::clamp(here + std::hypot(high - here, form), n.lower, n.upper)};
+  return {std::clamp(here - std::hypot(std::max(half, here - low), form), n.lower, n.upper),
+          std::clamp(here + std::hypot(std::max(half, high - here), form), n.lower, n.upper)};
 }
 
 }  // namespace
@@ -151,7 +169,7 @@ Cause described_cause(const TransitionModel& model, const RankedCause& ranked, c
   auto first = static_cast<Eigen::Index>(model.nuisances().size());
   for (const EffectTerm& term : ranked.terms) {
     if (likely && term.values.size() == 1) {
-      const auto [low, high] = likelihood_ends(model, ranked.fit, covariance, first);
+      const auto [low, high] = effect_ends(model, ranked, term, covariance, first);
       cause.parameters.push_back(between(term, low, high));
     } else {
       cause.parameters.push_back(estimates(term, covariance, first));
