@@ -67,6 +67,8 @@ void say_unnamed(std::vector<std::string>& s, const Diagnosis& d) {
                   facet->facet, facet->aspect, facet->stance ? "stances" : d.data.step_name + "s"));
 }
 
+constexpr double rounded_share = 0.1;  // Shares that differ by less are said as one.
+
 // Held-out shares may lie below 0 or above 1 by chance. A share that rounds to 0 % is written as less than 1 %, because
 // no share is known to be exactly nothing.
 std::string percent(double share) {
@@ -91,10 +93,17 @@ void say_what_is_at_work(std::vector<std::string>& s, const Diagnosis& d) {
   for (const AtWork& one : d.causes.at_work) {
     if (one.probability < d.rules.least_at_work) continue;
     std::string closes;
+    // An effect that differs between steps closes little while the parameters are those of the model as given.
+    const bool waits = one.closes_alone && one.closes_beside &&
+                       one.closes_beside->value > one.closes_alone->value + rounded_share && !several;
     if (one.closes_alone)
-      closes = fmt::format("; it closes {} of the gap{}", percent(one.closes_alone->value), several ? " alone" : "");
-    if (one.closes_alone && one.closes_beside && several)
-      closes += fmt::format(", {} when it is added last", percent(one.closes_beside->value));
+      closes = fmt::format("; it closes {} of the gap{}", percent(one.closes_alone->value),
+                           several ? " alone"
+                           : waits ? " in the model as given"
+                                   : "");
+    if (one.closes_alone && one.closes_beside && (several || waits))
+      closes += fmt::format(", {} when it is added {}", percent(one.closes_beside->value),
+                            waits ? "to the recalibrated model" : "last");
     s.push_back(fmt::format("At work with probability {:.2f}: {}{}.", one.probability, with_size(one), closes));
   }
 }

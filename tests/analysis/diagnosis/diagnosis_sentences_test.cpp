@@ -1,0 +1,41 @@
+#include "analysis/diagnosis/diagnosis_sentences.h"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <string>
+#include <vector>
+
+#include "analysis/diagnosis/diagnosis.h"
+
+namespace metastable::analysis {
+namespace {
+
+std::string said_at_work(double alone, double beside) {
+  Diagnosis d;
+  d.verdict = Verdict::explained;
+  AtWork one;
+  one.name = "a_by_phase";
+  one.effects = {"a_by_phase"};
+  one.probability = 1;
+  one.closes_alone = Estimate{alone, alone, alone};
+  one.closes_beside = Estimate{beside, beside, beside};
+  d.causes.at_work = {one};
+  d.causes.set = {"a_by_phase"};
+  Cause cause;
+  cause.effects = {"a_by_phase"};
+  d.causes.ranked = {cause};
+  const std::vector<std::string> all = sentences(d);
+  const auto at = std::ranges::find_if(all, [](const std::string& s) { return s.starts_with("At work"); });
+  return at == all.end() ? "" : *at;
+}
+
+TEST(DiagnosisSentences, SayWhatAnEffectClosesBesideOtherParameters) {
+  EXPECT_EQ(said_at_work(0.97, 0.12), "At work with probability 1.00: a_by_phase; it closes 97 % of the gap.");
+  EXPECT_EQ(said_at_work(-0.01, 0.25),
+            "At work with probability 1.00: a_by_phase; it closes less than 1 % of the gap in the model as given, 25 % "
+            "when it is added to the recalibrated model.");
+}
+
+}  // namespace
+}  // namespace metastable::analysis
