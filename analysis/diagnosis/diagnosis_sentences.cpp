@@ -67,7 +67,7 @@ void say_unnamed(std::vector<std::string>& s, const Diagnosis& d) {
                   facet->facet, facet->aspect, facet->stance ? "stances" : d.data.step_name + "s"));
 }
 
-constexpr double rounded_share = 0.1;  // Shares that differ by less are said as one.
+constexpr double rounded_share = 0.1;  // Convention: of one effect alone, shares that differ by less are said as one.
 
 // Held-out shares may lie below 0 or above 1 by chance. A share that rounds to 0 % is written as less than 1 %, because
 // no share is known to be exactly nothing.
@@ -95,7 +95,8 @@ void say_what_is_at_work(std::vector<std::string>& s, const Diagnosis& d) {
     std::string closes;
     // An effect that differs between steps closes little while the parameters are those of the model as given.
     const bool waits = one.closes_alone && one.closes_beside &&
-                       one.closes_beside->value > one.closes_alone->value + rounded_share && !several;
+                       one.closes_beside->value > one.closes_alone->value + rounded_share && !several &&
+                       d.causes.ranked.front().effects.size() == 1;
     if (one.closes_alone)
       closes = fmt::format("; it closes {} of the gap{}", percent(one.closes_alone->value),
                            several ? " alone"

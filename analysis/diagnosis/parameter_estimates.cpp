@@ -67,10 +67,10 @@ std::vector<EstimatedParameter> estimates(const EffectTerm& term, const Eigen::M
   return all;
 }
 
-// Returns the interval of an effect of one value, as far as its curvature or its likelihood reach. Where the curvature
-// says too much (at a jump of the map) the likelihood is wider. Towards none of the effect the likelihood alone counts
-// if nothing lies on the other side, as of a spread, and where the curvature says nothing (of a foot that always
-// sticks), so that it would hold the neutral value which the gain excludes.
+// Returns the interval of an effect of one value, as far as its curvature or its likelihood reaches, whichever is
+// farther: at a jump of the map the curvature is too large. Towards none of the effect the likelihood alone counts
+// where nothing lies on the other side, as of a spread, and where the curvature says nothing (of a foot that always
+// sticks) and would let the interval hold the neutral value, which the gain excludes.
 std::pair<double, double> effect_ends(const TransitionModel& model, const RankedCause& ranked, const EffectTerm& term,
                                       const Eigen::MatrixXd& covariance, Eigen::Index slot) {
   const FreeParameter& p = term.candidate->parameters[0];

@@ -412,6 +412,8 @@ void BeliefStep<Most>::take_cell(Part& part, std::size_t trial, const Cell& cell
 }
 
 // Makes the straight scores those of an outlier, in a part with all scores of the lattice at zero and in its columns.
+// What they bend stays that of a usual step: it is next to nothing, or the score would be on the lattice. Where an
+// offset between trials is merged with a score of the lattice, an outlier's cells widen the sum of both.
 template <int Most>
 void BeliefStep<Most>::widen(Part& part, Matrix& columns) const {
   const Eigen::Index scores = static_cast<Eigen::Index>(straight_.size()),

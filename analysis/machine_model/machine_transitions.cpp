@@ -27,9 +27,11 @@
 namespace metastable::analysis {
 namespace {
 
-constexpr double least_sensor = 1e-6, usual_sensor = 0.1;  // sd of an error that is not stated, in sds of its change
-constexpr double sensor_prior = 3;                         // sd of its logarithm
-constexpr std::size_t enough_levels = 5000;                // of values drawn: chance moves their distribution by 0.01
+constexpr double least_sensor = 1e-6, usual_sensor = 0.1;   // sd of an error that is not stated, in sds of its change
+constexpr double sensor_prior = 3;                          // sd of its logarithm
+constexpr double far_shares[]{1.0 / 32, 1.0 / 8, 1.0 / 2};  // of the way from none to a bound, where sizes are tried
+constexpr int far_passes = 2, far_rounds = 4;               // about the best of them: each is three times as fine
+constexpr std::size_t enough_levels = 5000;                 // of values drawn: chance moves their distribution by 0.01
 constexpr std::uint64_t most_own_draws = 20, own_seed = 0x6f776e;
 constexpr double usual_wild = -7, wild_prior = 1.5, least_wild = -12;  // logit of the share of wild rows
 constexpr double parameter_step = 1e-3;  // of the sd with which it is known, for differences
@@ -122,13 +124,15 @@ class MachineTransitions : public TransitionModel {
     for (FitStart& start : all)  // the share of wild rows is the last nuisance
       for (std::size_t slot = start.nuisance.size(); slot < nuisances_.size(); ++slot)
         start.nuisance.push_back(nuisances_[slot].nominal);
-    // A few outliers make the score of their share at none as large as they are rare under the model: it promises next
-    // to nothing, and a recalibration takes them for a wider noise.
+    // Where outliers are few, the likelihood rises so steeply at a share of none that the score test promises next to
+    // no gain, and a recalibration takes them for a wider noise: a fit starts from a likely share, too.
     if (std::ranges::any_of(terms, is_outliers)) {
       FitStart& start = all.emplace_back(FitStart{nominal_values(*this), {}, false});
       for (const EffectTerm& term : terms)
         start.values.push_back(is_outliers(term) ? std::vector{term.candidate->parameters[0].try_at} : term.values);
     }
+    if (terms.size() == 1 && terms[0].values.size() == 1 && terms[0].candidate->parameters[0].likely != 0)
+      all.push_back({nominal_values(*this), {{terms[0].candidate->parameters[0].likely}}, false});
     return all;
   }
   std::vector<double> rest_chances(std::span<const double> nuisance, std::span<const EffectTerm> terms) const override {
@@ -170,7 +174,10 @@ class MachineTransitions : public TransitionModel {
 
   std::unique_ptr<MachineTransitions> with_wide_priors() const;
   bool effect_speaks_for_what_is_stated(const Fit& recalibrated, const Fit& wide) const;
-  void set_aside_what_is_misstated();
+  void set_aside_what_is_misstated(const Fit& recalibrated);
+  std::pair<double, double> likeliest_size(const Candidate& candidate, const std::vector<double>& nuisance,
+                                           std::vector<double> sizes, double before) const;
+  void seek_far_sizes(const Fit& recalibrated);
   std::vector<double> levels_of_own_draws(const std::vector<double>& nuisance) const;
   std::vector<std::string> effects_instead(const Fit& recalibrated) const;
 
@@ -402,8 +409,7 @@ bool MachineTransitions::effect_speaks_for_what_is_stated(const Fit& recalibrate
 
 // Sets aside what is stated of each parameter that a recalibration moves far from it, where no effect speaks for the
 // stated value. The stated value then counts against no hypothesis, and no effect gains by bringing the parameter back.
-void MachineTransitions::set_aside_what_is_misstated() {
-  const Fit recalibrated = fit(*this, nominal_values(*this), {});
+void MachineTransitions::set_aside_what_is_misstated(const Fit& recalibrated) {
   std::size_t slot = 0;
   double strain = 0;
   for (const MachineParameter& p : machine_->parameters)
@@ -416,18 +422,67 @@ void MachineTransitions::set_aside_what_is_misstated() {
   for (const std::size_t one : slots) nuisances_[one].misstated = 1;
 }
 
+// Returns the size among these, and the one before, with which the runs are likeliest, and by how much they are
+// likelier than with the one before.
+std::pair<double, double> MachineTransitions::likeliest_size(const Candidate& candidate,
+                                                             const std::vector<double>& nuisance,
+                                                             std::vector<double> sizes, double before) const {
+  const FreeParameter& p = candidate.parameters[0];
+  sizes.push_back(before);
+  std::vector<double> likely(sizes.size());
+  side_by_side(sizes.size(), 1, [&](std::size_t i) {
+    sizes[i] = std::clamp(sizes[i], p.lower, p.upper);
+    const EffectTerm term{&candidate, candidate.variants.front(), {sizes[i]}};
+    likely[i] = evaluate(nuisance, {&term, 1}).total();
+  });
+  const auto best = static_cast<std::size_t>(std::ranges::max_element(likely) - likely.begin());
+  return {sizes[best], likely[best] - likely.back()};
+}
+
+// Seeks a likely size of each suspected effect of one parameter far from none of it. Where the effect moves a threshold
+// the likelihood is a staircase, along which no slope leads: fits start from that size, too.
+void MachineTransitions::seek_far_sizes(const Fit& recalibrated) {
+  for (Candidate& candidate : candidates_) {
+    const bool suspected =
+        std::ranges::find(machine_->effects, candidate.id, &MachineEffect::id) != machine_->effects.end();
+    if (!suspected || candidate.parameters.size() != 1) continue;
+    FreeParameter& p = candidate.parameters[0];
+    std::vector<double> sizes;
+    for (const double share : far_shares)
+      for (const double end : {p.lower, p.upper})
+        if (end != p.neutral) sizes.push_back(p.neutral + share * (end - p.neutral));
+    std::vector<double> nuisance = recalibrated.nuisance;
+    auto [best, rise] = likeliest_size(candidate, nuisance, sizes, p.neutral);
+    if (rise < Rules{}.told_apart / 2) continue;
+    for (int pass = 0; pass < far_passes; ++pass) {
+      const EffectTerm term{&candidate, candidate.variants.front(), {best}};
+      nuisance = fit(*this, nuisance, {term}, {.count = {}, .refit_effects = false}).nuisance;
+      double around = std::abs(best - p.neutral);
+      for (int round = 0; round < far_rounds; ++round, around /= 3) {
+        sizes.clear();
+        for (int k = -4; k <= 4; ++k) sizes.push_back(best + 0.25 * k * around);
+        best = likeliest_size(candidate, nuisance, sizes, best).first;
+      }
+    }
+    p.likely = best;
+  }
+}
+
 // Returns, in ascending order, the levels of the measured values of runs drawn from the model: the share of values
 // below each, of those of rows that go on. They are uniform where the likelihood is that of what is drawn.
 std::vector<double> MachineTransitions::levels_of_own_draws(const std::vector<double>& nuisance) const {
+  const MachineHypothesis supposed = hypothesis(nuisance, {});
   std::vector<double> levels;
   for (std::uint64_t draw = 0; draw < most_own_draws && levels.size() < enough_levels; ++draw) {
     const auto own = drawn(runs_, nuisance, {}, own_seed + draw, Launches::stated);
     std::vector<double> failed;
-    const Evaluation there =
-        follow_machine(*machine_, own->runs_, own->plan_, own->events_, hypothesis(nuisance, {}), &failed);
-    for (std::size_t e = 0; e < own->events_.size(); ++e)
-      if (own->events_[e].kind == EventKind::step && failed[e] < 1)
-        levels.push_back((dynamics::normal_cdf(there.score[e]) - failed[e]) / (1 - failed[e]));
+    const Evaluation there = follow_machine(*machine_, own->runs_, own->plan_, own->events_, supposed, &failed);
+    for (std::size_t e = 0; e < own->events_.size(); ++e) {
+      if (own->events_[e].kind != EventKind::step || failed[e] >= 1) continue;
+      // The score counts a failure as a value below all, and a wild row as one that may be a failure.
+      const double below = own->events_[e].rested ? supposed.wild + (1 - supposed.wild) * failed[e] : 0;
+      levels.push_back((dynamics::normal_cdf(there.score[e]) - below) / (1 - below));
+    }
   }
   std::ranges::sort(levels);
   return levels;
@@ -440,8 +495,10 @@ void MachineTransitions::require_own_draws(const Fit& recalibrated) const {
   for (std::size_t i = 0; i < levels.size(); ++i)
     apart = std::max({apart, std::abs(levels[i] - static_cast<double>(i) / count),
                       std::abs(levels[i] - static_cast<double>(i + 1) / count)});
+  const auto measured = static_cast<double>(std::ranges::count(events_, EventKind::step, &Event::kind));
   const Rules rules;
-  if (apart < rules.own_draws_apart || apart * std::sqrt(static_cast<double>(events_.size())) < rules.own_draws_shown)
+  if (apart < rules.own_draws_apart || apart * std::sqrt(measured) < rules.own_draws_shown ||
+      apart * std::sqrt(count) < rules.own_draws_by_chance)
     return;
   throw std::runtime_error(fmt::format(
       "step: rows that it draws itself are not distributed as its likelihood says (distribution functions "
@@ -496,7 +553,9 @@ std::vector<std::string> MachineTransitions::misstated(const Fit& recalibrated) 
 
 std::unique_ptr<TransitionModel> machine_transitions(std::shared_ptr<const Machine> machine, MachineRuns runs) {
   auto model = std::make_unique<MachineTransitions>(refusing_nan(std::move(machine)), std::move(runs));
-  model->set_aside_what_is_misstated();
+  const Fit recalibrated = fit(*model, nominal_values(*model), {});
+  model->set_aside_what_is_misstated(recalibrated);
+  model->seek_far_sizes(recalibrated);
   return model;
 }
 

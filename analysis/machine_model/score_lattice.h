@@ -18,7 +18,8 @@ struct CellPart {
 CellPart cell_part(double centre, double spread, std::span<const std::pair<double, double>> inside);
 
 /// One axis of a lattice: the standard normal as a mixture of normals of sd `spread` at equal distances, exact to 1e-4
-/// of its density out to five sds. The first and last points serve for slopes only.
+/// of its density out to five sds. The first and last points have no such cell: they serve
+/// for slopes, and as the tails of an outlier's score.
 struct LatticeAxis {
   double spread = 0, spacing = 0;
   std::vector<double> points;   ///< ascending

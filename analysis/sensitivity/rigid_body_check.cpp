@@ -247,8 +247,8 @@ std::string rigid_body_sentence(std::span<const BesideRigidBodies> all, dynamics
     if (one.check.reason.empty()) known.push_back(&one);
   const std::string head = fmt::format("No law was named, so the answer is that of {}; ", dynamics::law_name(law));
   if (known.empty())
-    return head + fmt::format("that of rigid bodies (settled) has no answer: {}.",
-                              all.empty() ? "it knows no such wheel" : all.front().check.reason);
+    return head + fmt::format("rigid bodies (law settled) have no answer: {}.",
+                              all.empty() ? "the law knows no such wheel" : all.front().check.reason);
   return head + (all.size() == 1 ? alone_text(*known.front(), law) : several_text(known, law)) + ".";
 }
 

@@ -10,7 +10,7 @@
 namespace metastable::markov {
 namespace {
 
-constexpr double most_points = 1e7;
+constexpr double most_points = 1e7;  // A mesh asks the map at all of them for every node.
 
 // Returns the volume of the ball in units of the spacing, about as many points as it holds.
 double foreseen_points(int scores, double in_spacings) {
@@ -27,10 +27,11 @@ ScoreLattice::ScoreLattice(int scores, double spacing, double reach)
     throw std::invalid_argument(
         fmt::format("lattice: spacing {} outside (0, 1] or reach {} not positive", spacing, reach));
   if (const double foreseen = foreseen_points(scores, reach / spacing); foreseen > most_points)
-    throw std::length_error(fmt::format(
-        "a lattice over {} noises would hold about {:.1g} points for every state, {:.0g} are allowed; splitting takes "
-        "any number of noises",
-        scores, foreseen, most_points));
+    throw std::length_error(
+        fmt::format("a lattice over {} of the noises would hold about {:.1g} points for every state, {:.0g} are "
+                    "allowed; splitting by "
+                    "a learnt level takes any number of noises",
+                    scores, foreseen, most_points));
   const int most = static_cast<int>(std::ceil(reach / spacing));
   std::vector<int> at(scores_, -most);
   for (;;) {

@@ -63,8 +63,8 @@ constexpr Word of_the_chain[] = {
      "Spectral: the steps in which differences fade by a factor of e. Total variation: the steps from this launch "
      "until "
      "its distribution of speeds is within 0.05 of that of the regime."},
-    {"resolution", "how finely the speeds are cut, and how many contacts are drawn", ""},
-    {"relative error", "the two parts of the interval, as shares of the expected steps",
+    {"resolution", "how finely the speeds are cut, and how many contacts are drawn, if any", ""},
+    {"relative error", "what cells and draws leave open, as shares of the expected steps",
      "Discretization is the part of the cells, sampling that of the draws."}};
 constexpr Word assumptions[] = {
     {"foot lifts", "too fast for gravity alone to hold the standing foot on the ramp",

@@ -145,6 +145,30 @@ TEST(MachineTransitions, AMapThatFoldsOrJumpsInItsNoiseIsRefused) {
   }
 }
 
+// The suspected effect moves a threshold of the state, so that the likelihood is a staircase in it, with no slope at
+// none.
+TEST(MachineTransitions, AThresholdThatIsOffIsFound) {
+  const auto kept = [](double x, double threshold) {
+    return x > threshold ? 0.5 * (x - threshold) + 0.9 : 0.95 * x + 0.15;
+  };
+  Machine machine = linear_machine(0.01);
+  machine.parameters = {{"a", 0, 0.05}, {"b", 0, 0.05}, {"s", 0.15, 0.05, 0.01, 2}};
+  machine.effects = {{"friction", {{"more", 0, -0.5, 0.5}}}};
+  machine.step = [kept](const MachineBatch& batch) {
+    for (std::size_t i = 0; i < batch.rows; ++i) {
+      const double x = batch.states[i];
+      batch.next[i] = kept(x, 1 + batch.value(3, i)) + batch.value(0, i) * x + batch.value(1, i) +
+                      batch.value(2, i) * batch.scores[i];
+    }
+  };
+  const auto next = [&](double x, double z, std::size_t) { return kept(x, 1.15) + 0.15 * z; };
+  const auto model =
+      machine_transitions(std::make_shared<const Machine>(machine), scalar_runs(40, 20, 1, 0.01, 6, next));
+  const Diagnosis d = diagnose(*model, {.catalogue = {"friction"}, .draws = 400});
+  ASSERT_EQ(d.causes.set, std::vector<std::string>{"friction"}) << said(d);
+  EXPECT_NEAR(d.causes.ranked.front().parameters[0][0].value, 0.15, 0.03) << said(d);
+}
+
 // The record holds some ten and thirty periods of the sine. A list of few frequencies at equal ratios has none near
 // enough, and the clock passes for a memory of the noise.
 TEST(MachineTransitions, AClockIsFoundWhereverItsFrequencyLies) {

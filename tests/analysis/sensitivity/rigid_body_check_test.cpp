@@ -105,7 +105,7 @@ TEST(RigidBodyCheck, SaysWhyThereIsNone) {
   EXPECT_EQ(check.reason, "restitution: mean 0.97 is outside [0, 0.95], the range of law settled");
   EXPECT_EQ(check.wheels, 0U);
   EXPECT_EQ(rigid_body_sentence(std::vector{BesideRigidBodies{"", {1, 1, 1}, check}}, setting.law),
-            "No law was named, so the answer is that of published; that of rigid bodies (settled) has no answer: "
+            "No law was named, so the answer is that of published; rigid bodies (law settled) have no answer: "
             "restitution: mean "
             "0.97 is outside [0, 0.95], the range of law settled.");
 }

@@ -30,8 +30,8 @@ TEST(ScoreLattice, HasTheMomentsOfNormals) {
 // Fifteen noises would take 7e16 points: it is said at once.
 TEST(ScoreLattice, RefusesMorePointsThanAStateCanHave) {
   const std::string message = message_of<std::length_error>([] { ScoreLattice(15, 0.6, 8.5); });
-  EXPECT_TRUE(message.starts_with("a lattice over 15 noises would hold about ")) << message;
-  EXPECT_NE(message.find("splitting takes any number of noises"), std::string::npos) << message;
+  EXPECT_TRUE(message.starts_with("a lattice over 15 of the noises would hold about ")) << message;
+  EXPECT_NE(message.find("takes any number of noises"), std::string::npos) << message;
 }
 
 }  // namespace
