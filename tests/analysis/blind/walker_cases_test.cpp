@@ -85,7 +85,7 @@ TEST(WalkerAgreement, FormsAreTheInverseOfReports) {
 // than at a third or three times its size.
 TEST(WalkerAgreement, EveryEffectIsFoundAtItsSize) {
   for (const dynamics::Effect& effect : visible_effects()) {
-    const Walks walks = laboratory_walks_with({effect}, effect.id == "outliers" ? 60 : 24);  // Rare steps are counted.
+    const Walks walks = laboratory_walks_with({effect}, effect.id == "outliers" ? 48 : 24);  // Rare steps are counted.
     const auto model = machine_transitions(walks.machine, walks.runs);
     const EffectTerm term = fitted_term(*model, effect);
     const auto likelihood = [&](double size) {

@@ -171,7 +171,7 @@ TEST_F(StepsCommand, ALimitThatEndsTheCheckOfRigidBodiesLeavesTheAnswer) {
   EXPECT_GE(answer.study.steps.from_start.value, 1);
   const std::string text = steps_answer_text(request, answer, 120);
   for (const char* said : {"expected steps before failure", "none: the time limit of 7 s ended the check",
-                           "that of rigid bodies (settled) has no answer: the time limit of 7 s ended the check."})
+                           "rigid bodies (law settled) have no answer: the time limit of 7 s ended the check."})
     EXPECT_NE(text.find(said), std::string::npos) << text;
   EXPECT_NE(steps_answer_json(request, answer).find("the time limit of 7 s ended the check"), std::string::npos);
 }
