@@ -79,7 +79,8 @@ std::pair<double, double> effect_ends(const TransitionModel& model, const Ranked
   const bool there = ranked.terms.size() == 1 && ranked.gain > surely_there && std::abs(value - p.neutral) < half;
   const bool alone_below = p.neutral <= p.lower || (there && p.neutral < value),
              alone_above = p.neutral >= p.upper || (there && p.neutral > value);
-  return {alone_below ? low : std::min(low, value - half), alone_above ? high : std::max(high, value + half)};
+  return {std::min(alone_below ? low : std::min(low, value - half), value - p.blur),
+          std::max(alone_above ? high : std::max(high, value + half), value + p.blur)};
 }
 
 // Holds what one of an effect's variants says of its numbers.

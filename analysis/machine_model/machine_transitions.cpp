@@ -31,7 +31,11 @@ constexpr double least_sensor = 1e-6, usual_sensor = 0.1;   // sd of an error th
 constexpr double sensor_prior = 3;                          // sd of its logarithm
 constexpr double far_shares[]{1.0 / 32, 1.0 / 8, 1.0 / 2};  // of the way from none to a bound, where sizes are tried
 constexpr int far_passes = 2, far_rounds = 4;               // about the best of them: each is three times as fine
-constexpr std::size_t enough_levels = 5000;                 // of values drawn: chance moves their distribution by 0.01
+constexpr double rough_stairs =
+    0.5;  // nats of a third difference: a smooth likelihood has next to none so near its top
+constexpr double stairs_reach = 0.15, stairs_fall = 3;  // of the size, and nats, within which other sizes are as likely
+constexpr int stairs_to_a_side = 40;
+constexpr std::size_t enough_levels = 5000;  // of values drawn: chance moves their distribution by 0.01
 constexpr std::uint64_t most_own_draws = 20, own_seed = 0x6f776e;
 constexpr double usual_wild = -7, wild_prior = 1.5, least_wild = -12;  // logit of the share of wild rows
 constexpr double parameter_step = 1e-3;  // of the sd with which it is known, for differences
@@ -175,8 +179,9 @@ class MachineTransitions : public TransitionModel {
   std::unique_ptr<MachineTransitions> with_wide_priors() const;
   bool effect_speaks_for_what_is_stated(const Fit& recalibrated, const Fit& wide) const;
   void set_aside_what_is_misstated(const Fit& recalibrated);
-  std::pair<double, double> likeliest_size(const Candidate& candidate, const std::vector<double>& nuisance,
-                                           std::vector<double> sizes, double before) const;
+  std::vector<double> likely_with(const Candidate& candidate, const std::vector<double>& nuisance,
+                                  std::vector<double>& sizes) const;
+  void refine_far_size(FreeParameter& p, const Candidate& candidate, double best, std::vector<double> nuisance) const;
   void seek_far_sizes(const Fit& recalibrated);
   std::vector<double> levels_of_own_draws(const std::vector<double>& nuisance) const;
   std::vector<std::string> effects_instead(const Fit& recalibrated) const;
@@ -422,25 +427,56 @@ void MachineTransitions::set_aside_what_is_misstated(const Fit& recalibrated) {
   for (const std::size_t one : slots) nuisances_[one].misstated = 1;
 }
 
-// Returns the size among these, and the one before, with which the runs are likeliest, and by how much they are
-// likelier than with the one before.
-std::pair<double, double> MachineTransitions::likeliest_size(const Candidate& candidate,
-                                                             const std::vector<double>& nuisance,
-                                                             std::vector<double> sizes, double before) const {
+// Returns how likely the runs are with each of these sizes of an effect of one parameter, which it brings inside its
+// bounds [log likelihood].
+std::vector<double> MachineTransitions::likely_with(const Candidate& candidate, const std::vector<double>& nuisance,
+                                                    std::vector<double>& sizes) const {
   const FreeParameter& p = candidate.parameters[0];
-  sizes.push_back(before);
   std::vector<double> likely(sizes.size());
   side_by_side(sizes.size(), 1, [&](std::size_t i) {
     sizes[i] = std::clamp(sizes[i], p.lower, p.upper);
     const EffectTerm term{&candidate, candidate.variants.front(), {sizes[i]}};
     likely[i] = evaluate(nuisance, {&term, 1}).total();
   });
-  const auto best = static_cast<std::size_t>(std::ranges::max_element(likely) - likely.begin());
-  return {sizes[best], likely[best] - likely.back()};
+  return likely;
 }
 
-// Seeks a likely size of each suspected effect of one parameter far from none of it. Where the effect moves a threshold
-// the likelihood is a staircase, along which no slope leads: fits start from that size, too.
+// Seeks the likeliest size about one with which the runs are likelier than without the effect, in ever finer steps.
+// Where the likelihood is a staircase, of an effect that moves a threshold, it says how far about the size others are
+// about as likely.
+void MachineTransitions::refine_far_size(FreeParameter& p, const Candidate& candidate, double best,
+                                         std::vector<double> nuisance) const {
+  const auto about = [&](double reach, int to_a_side) {
+    std::vector<double> sizes;
+    for (int k = -to_a_side; k <= to_a_side; ++k) sizes.push_back(best + reach * k / to_a_side);
+    std::vector<double> likely = likely_with(candidate, nuisance, sizes);
+    best = sizes[static_cast<std::size_t>(std::ranges::max_element(likely) - likely.begin())];
+    return std::pair(std::move(sizes), std::move(likely));
+  };
+  double roughness = 0;  // largest third difference of the log likelihood
+  for (int pass = 0; pass < far_passes; ++pass) {
+    const EffectTerm term{&candidate, candidate.variants.front(), {best}};
+    nuisance = fit(*this, nuisance, {term}, {.count = {}, .refit_effects = false}).nuisance;
+    double reach = std::abs(best - p.neutral);
+    for (int round = 0; round < far_rounds; ++round, reach /= 3) {
+      const std::vector<double> likely = about(reach, 4).second;
+      roughness = 0;
+      for (std::size_t i = 3; i < likely.size(); ++i)
+        roughness = std::max(roughness, std::abs(likely[i] - 3 * likely[i - 1] + 3 * likely[i - 2] - likely[i - 3]));
+    }
+  }
+  p.likely = best;
+  if (roughness < rough_stairs) return;
+  const auto [sizes, likely] = about(stairs_reach * std::abs(best - p.neutral), stairs_to_a_side);
+  p.likely = best;
+  const double most = *std::ranges::max_element(likely);
+  for (std::size_t i = 0; i < sizes.size(); ++i)
+    if (likely[i] > most - stairs_fall) p.blur = std::max(p.blur, std::abs(sizes[i] - best));
+  p.blur += sizes[1] - sizes[0];
+}
+
+// Seeks a likely size of each suspected effect of one parameter far from none of it: fits start from there, too. No
+// slope leads up a staircase.
 void MachineTransitions::seek_far_sizes(const Fit& recalibrated) {
   for (Candidate& candidate : candidates_) {
     const bool suspected =
@@ -451,20 +487,10 @@ void MachineTransitions::seek_far_sizes(const Fit& recalibrated) {
     for (const double share : far_shares)
       for (const double end : {p.lower, p.upper})
         if (end != p.neutral) sizes.push_back(p.neutral + share * (end - p.neutral));
-    std::vector<double> nuisance = recalibrated.nuisance;
-    auto [best, rise] = likeliest_size(candidate, nuisance, sizes, p.neutral);
-    if (rise < Rules{}.told_apart / 2) continue;
-    for (int pass = 0; pass < far_passes; ++pass) {
-      const EffectTerm term{&candidate, candidate.variants.front(), {best}};
-      nuisance = fit(*this, nuisance, {term}, {.count = {}, .refit_effects = false}).nuisance;
-      double around = std::abs(best - p.neutral);
-      for (int round = 0; round < far_rounds; ++round, around /= 3) {
-        sizes.clear();
-        for (int k = -4; k <= 4; ++k) sizes.push_back(best + 0.25 * k * around);
-        best = likeliest_size(candidate, nuisance, sizes, best).first;
-      }
-    }
-    p.likely = best;
+    const std::vector<double> likely = likely_with(candidate, recalibrated.nuisance, sizes);
+    const auto best = std::ranges::max_element(likely);
+    if (best == likely.end() || *best < recalibrated.log_likelihood + Rules{}.told_apart / 2) continue;
+    refine_far_size(p, candidate, sizes[static_cast<std::size_t>(best - likely.begin())], recalibrated.nuisance);
   }
 }
 
