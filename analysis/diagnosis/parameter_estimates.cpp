@@ -141,8 +141,8 @@ void cover_variants(const RankedCause& ranked, const EffectScan& scan, std::vect
     }
 }
 
-// Returns the 90 % interval of a nuisance, by chance, as far as its curvature or its likelihood reach, and by what
-// errors of the model's form move it.
+// Returns the 90 % interval of a nuisance. It holds what chance leaves open, as far as the curvature or the likelihood
+// reaches, and what errors of the model's form move the nuisance by.
 std::pair<double, double> nuisance_ends(const TransitionModel& model, const Fit& fit, const Eigen::MatrixXd& covariance,
                                         Eigen::Index slot) {
   const Nuisance& n = model.nuisances()[static_cast<std::size_t>(slot)];

@@ -24,7 +24,7 @@ namespace {
 constexpr double largest_log_odds = 300;  // of something unnamed: their exponential stays finite
 constexpr std::size_t most_beside = 3;    // hypotheses, the recalibrated model not counted,
 constexpr double beside_margin = 12;      //   whose evidence is no further behind the best
-constexpr double followed_weight = 1e-3;  // of a hypothesis beside the best: less likely ones get rough intervals
+constexpr double followed_weight = 1e-3;  // A hypothesis of less weight beside the best gets rough intervals.
 
 // Returns the square that the largest of so many standard normals exceeds with this probability, to first order.
 double square_by_chance(double level, std::size_t cells) {

@@ -12,7 +12,7 @@ namespace metastable::analysis {
 namespace {
 
 constexpr int most_tries = 16;         // An end takes three on most sides.
-constexpr double close_enough = 0.03;  // to the root of twice the fall at an end, in standard deviations
+constexpr double close_enough = 0.03;  // The root of twice the fall at an end may be off by so many sds.
 constexpr double least_factor = 0.3, most_factor = 3;  // A distance changes by these at most from one try to the next.
 
 // Holds the fitted values of a hypothesis, which move together along a line.
@@ -21,57 +21,48 @@ class FitLine {
   FitLine(const TransitionModel& model, const Fit& fit, const Eigen::MatrixXd& covariance, Eigen::Index slot)
       : model_(model), fit_(fit), slot_(static_cast<std::size_t>(slot)) {
     if (covariance(slot, slot) > 0) along_ = covariance.col(slot) / covariance(slot, slot);
-    const std::vector<Nuisance>& nuisances = model.nuisances();
-    for (std::size_t i = 0; i < nuisances.size(); ++i) parts_.push_back({fit.nuisance[i], nuisances[i]});
+    for (std::size_t i = 0; i < fit.nuisance.size(); ++i)
+      parts_.push_back({fit.nuisance[i], model.nuisances()[i].lower, model.nuisances()[i].upper});
     for (const EffectTerm& term : fit.terms)
       for (std::size_t i = 0; i < term.values.size(); ++i) {
         const FreeParameter& p = term.candidate->parameters[i];
-        Nuisance bounded;
-        bounded.nominal = p.neutral;
-        bounded.prior_sd = p.prior_sd;
-        bounded.lower = p.lower;
-        bounded.upper = p.upper;
-        parts_.push_back({term.values[i], bounded});
+        parts_.push_back({term.values[i], p.lower, p.upper});
       }
   }
   double value() const { return parts_[slot_].value; }
   double room(int side) const {
     const Part& own = parts_[slot_];
-    return side > 0 ? own.prior.upper - own.value : own.value - own.prior.lower;
+    return side > 0 ? own.upper - own.value : own.value - own.lower;
   }
-  // Returns the root of twice the fall of the penalised likelihood that far from the top; 0 where it rises.
+  // Returns the root of twice what the penalised likelihood falls by from the top to there; 0 if it rises.
   double fallen(double distance) const {
     std::vector<double> nuisance = fit_.nuisance;
     std::vector<EffectTerm> terms = fit_.terms;
-    double prior = 0;
     std::size_t part = 0;
     const auto move = [&](double& value) {
       const Part& one = parts_[part];
-      value =
-          std::clamp(one.value + distance * along_[static_cast<Eigen::Index>(part)], one.prior.lower, one.prior.upper);
-      if (one.prior.prior_sd > 0) prior += one.prior.cost(value);
-      ++part;
+      value = std::clamp(one.value + distance * along_[static_cast<Eigen::Index>(part++)], one.lower, one.upper);
     };
     for (double& value : nuisance) move(value);
     for (EffectTerm& term : terms)
       for (double& value : term.values) move(value);
-    const double fall = fit_.penalised - (model_.evaluate(nuisance, terms).total() - prior);
+    const double fall = fit_.penalised - fit(model_, nuisance, terms, {.count = {}, .most_iterations = 0}).penalised;
     return std::isnan(fall) ? std::numeric_limits<double>::infinity() : std::sqrt(2 * std::max(0.0, fall));
   }
 
  private:
   struct Part {
-    double value;
-    Nuisance prior;
+    double value, lower, upper;
   };
   const TransitionModel& model_;
   const Fit& fit_;
   std::size_t slot_;
-  Eigen::VectorXd along_;  // what all parameters move by where this one moves by 1
+  Eigen::VectorXd along_;  // All parameters move by these where this one moves by 1.
   std::vector<Part> parts_;
 };
 
-// The root of twice the fall is nearly proportional to the distance; where it is not, what holds the end is halved.
+// The root of twice the fall is nearly proportional to the distance. If a step by that rule leaves the interval that
+// holds the end, the interval is halved.
 double distance_to_end(const FitLine& line, int side, double expected) {
   const double room = std::max(0.0, line.room(side));
   double distance = std::min(expected, room), inside = 0, outside = room;

@@ -113,18 +113,19 @@ struct Rules {
   /// would pass for its cause.
   static constexpr std::size_t least_trials_to_explain = 4, least_transitions_to_explain = 40;
 
-  // What a machine draws of itself, against its likelihood. The benchmark does not turn these.
+  // These rules compare values that a machine draws with its own likelihood. The benchmark does not turn them.
 
-  /// Distance of two distribution functions, that of the levels of values which the model draws and the uniform one,
-  /// from which on no diagnosis is given. Measurement: machines that move smoothly and one way with each noise, walkers
-  /// that fall in four of five trials among them, stay below 0.023; those with |z|, z^2, a jump or a dead zone in a
-  /// noise z come to 0.04 to 0.22, and had effects named that were not there (two of them in
-  /// `ctest -R MachineTransitions.AMapThatFolds`).
+  /// No diagnosis is given from this distance on between two distribution functions: that of the levels which the
+  /// likelihood gives to values drawn from the model, and the uniform one that they should have. Measurement: machines
+  /// that move smoothly and one way with each noise, walkers that fall in four of five trials among them, stay below
+  /// 0.023; those with |z|, z^2, a jump or a dead zone in a noise z come to 0.04 to 0.22, and had effects named that
+  /// were not there (two of them in `ctest -R MachineTransitions.AMapThatFolds`).
   static constexpr double own_draws_apart = 0.03;
-  /// The same times the root of the count of measured values. Convention: below half of Kolmogorov's 5 % limit of 1.36
-  /// the data themselves show nothing of it.
+  /// That distance times the root of the count of measured values has to be this large, too. Convention: below half of
+  /// Kolmogorov's 5 % limit of 1.36 the data themselves show nothing of it.
   static constexpr double own_draws_shown = 0.6;
-  /// The same times the root of the count of values drawn. Derivation: by chance it exceeds 2 in 0.07 % of samples.
+  /// That distance times the root of the count of values drawn has to be this large, too. Derivation: by chance it
+  /// exceeds 2 in 0.07 % of samples.
   static constexpr double own_draws_by_chance = 2;
 
   // Trials of two machines in one folder. The benchmark does not turn these.

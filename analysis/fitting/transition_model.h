@@ -88,7 +88,7 @@ struct FreeParameter {
   double try_at = 0;    ///< a size worth starting from where the neutral value says nothing; 0: start at neutral
   double likely = 0;    ///< a size that the data show by themselves, from which fits start as well; 0: there is none
   double prior_sd = 0;  ///< of a normal prior about neutral, where more is known than the bounds say; 0: there is none
-  double blur = 0;      ///< to either side of a fitted value others are about as likely, however the likelihood falls
+  double blur = 0;      ///< values so far to either side of a fitted one are about as likely as that one
 };
 
 /// A number as it is reported: by its name.

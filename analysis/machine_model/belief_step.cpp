@@ -248,7 +248,7 @@ typename BeliefStep<Most>::Part BeliefStep<Most>::part(const Slopes& slopes, con
 }
 
 // A cell is cut where its line fails; where its own point failed it takes the next state of the nearest that did not.
-// @param wide  the cell of an outlier's scores, which the outermost points have, too
+// @param wide  whether the cell is one of an outlier's scores; the outermost points have such cells, too
 template <int Most>
 typename BeliefStep<Most>::Cell BeliefStep<Most>::cell(std::size_t trial, std::size_t point,
                                                        std::span<const FailureLine<Most>> lines, bool wide) const {
@@ -412,8 +412,8 @@ void BeliefStep<Most>::take_cell(Part& part, std::size_t trial, const Cell& cell
 }
 
 // Makes the straight scores those of an outlier, in a part with all scores of the lattice at zero and in its columns.
-// What they bend stays that of a usual step: it is next to nothing, or the score would be on the lattice. Where an
-// offset between trials is merged with a score of the lattice, an outlier's cells widen the sum of both.
+// The bends that the straight scores cause stay those of a usual step: a score that bends the map visibly is on the
+// lattice. If an offset between trials is merged with a score of the lattice, an outlier's cells widen both together.
 template <int Most>
 void BeliefStep<Most>::widen(Part& part, Matrix& columns) const {
   const Eigen::Index scores = static_cast<Eigen::Index>(straight_.size()),
@@ -425,7 +425,7 @@ void BeliefStep<Most>::widen(Part& part, Matrix& columns) const {
 
 // Adds a part for every cell that goes on, with its weight, and returns the chance of failing.
 // @param common    the step with the scores of the lattice at zero  @param straight  its columns
-// @param wide      the cells are those of an outlier's scores
+// @param wide      whether the cells are those of an outlier's scores
 template <int Most>
 double BeliefStep<Most>::add_cells(BeliefMixture<Most>& belief, std::size_t trial, const Slopes& slope,
                                    const Part& common, const Matrix& straight, std::span<const FailureLine<Most>> lines,

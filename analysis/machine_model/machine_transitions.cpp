@@ -27,15 +27,17 @@
 namespace metastable::analysis {
 namespace {
 
-constexpr double least_sensor = 1e-6, usual_sensor = 0.1;   // sd of an error that is not stated, in sds of its change
-constexpr double sensor_prior = 3;                          // sd of its logarithm
-constexpr double far_shares[]{1.0 / 32, 1.0 / 8, 1.0 / 2};  // of the way from none to a bound, where sizes are tried
-constexpr int far_passes = 2, far_rounds = 4;               // about the best of them: each is three times as fine
-constexpr double rough_stairs =
-    0.5;  // nats of a third difference: a smooth likelihood has next to none so near its top
-constexpr double stairs_reach = 0.15, stairs_fall = 3;  // of the size, and nats, within which other sizes are as likely
+constexpr double least_sensor = 1e-6, usual_sensor = 0.1;  // sd of an error that is not stated, in sds of its change
+constexpr double sensor_prior = 3;                         // sd of its logarithm
+constexpr double far_shares[]{1.0 / 32, 1.0 / 8,
+                              1.0 / 2};        // Sizes are tried at these shares of the way from none to a bound.
+constexpr int far_passes = 2, far_rounds = 4;  // Rounds about the best size are each three times as fine as the last.
+// A likelihood is a staircase if its third difference near the top exceeds so many nats, where smooth ones have none.
+constexpr double rough_stairs = 0.5;
+// Sizes are then compared within this share of the size, so many to a side; those within so many nats are as likely.
+constexpr double stairs_reach = 0.15, stairs_fall = 3;
 constexpr int stairs_to_a_side = 40;
-constexpr std::size_t enough_levels = 5000;  // of values drawn: chance moves their distribution by 0.01
+constexpr std::size_t enough_levels = 5000;  // Chance moves the distribution of so many values by 0.01.
 constexpr std::uint64_t most_own_draws = 20, own_seed = 0x6f776e;
 constexpr double usual_wild = -7, wild_prior = 1.5, least_wild = -12;  // logit of the share of wild rows
 constexpr double parameter_step = 1e-3;  // of the sd with which it is known, for differences
@@ -128,13 +130,14 @@ class MachineTransitions : public TransitionModel {
     for (FitStart& start : all)  // the share of wild rows is the last nuisance
       for (std::size_t slot = start.nuisance.size(); slot < nuisances_.size(); ++slot)
         start.nuisance.push_back(nuisances_[slot].nominal);
-    // Where outliers are few, the likelihood rises so steeply at a share of none that the score test promises next to
-    // no gain, and a recalibration takes them for a wider noise: a fit starts from a likely share, too.
+    // The score test promises few outliers next to no gain, because the likelihood is far too steep at a share of none,
+    // and a recalibration takes them for a wider noise. So a fit starts from a likely share, too.
     if (std::ranges::any_of(terms, is_outliers)) {
       FitStart& start = all.emplace_back(FitStart{nominal_values(*this), {}, false});
       for (const EffectTerm& term : terms)
         start.values.push_back(is_outliers(term) ? std::vector{term.candidate->parameters[0].try_at} : term.values);
     }
+    // An effect with a likely size is fitted from there whatever its scores promise, and with what is stated beside it.
     if (terms.size() == 1 && terms[0].values.size() == 1 && terms[0].candidate->parameters[0].likely != 0)
       all.push_back({nominal_values(*this), {{terms[0].candidate->parameters[0].likely}}, false});
     return all;
@@ -427,8 +430,8 @@ void MachineTransitions::set_aside_what_is_misstated(const Fit& recalibrated) {
   for (const std::size_t one : slots) nuisances_[one].misstated = 1;
 }
 
-// Returns how likely the runs are with each of these sizes of an effect of one parameter, which it brings inside its
-// bounds [log likelihood].
+// Returns the log likelihood of the runs with each of these sizes of an effect of one parameter. Sizes beyond its
+// bounds are set to these.
 std::vector<double> MachineTransitions::likely_with(const Candidate& candidate, const std::vector<double>& nuisance,
                                                     std::vector<double>& sizes) const {
   const FreeParameter& p = candidate.parameters[0];
@@ -441,9 +444,8 @@ std::vector<double> MachineTransitions::likely_with(const Candidate& candidate, 
   return likely;
 }
 
-// Seeks the likeliest size about one with which the runs are likelier than without the effect, in ever finer steps.
-// Where the likelihood is a staircase, of an effect that moves a threshold, it says how far about the size others are
-// about as likely.
+// Sets the likely size of an effect, which it seeks in ever finer steps about a size that is likelier than none. An
+// effect that moves a threshold makes the likelihood a staircase: its sizes that are about as likely set the blur.
 void MachineTransitions::refine_far_size(FreeParameter& p, const Candidate& candidate, double best,
                                          std::vector<double> nuisance) const {
   const auto about = [&](double reach, int to_a_side) {
@@ -453,7 +455,7 @@ void MachineTransitions::refine_far_size(FreeParameter& p, const Candidate& cand
     best = sizes[static_cast<std::size_t>(std::ranges::max_element(likely) - likely.begin())];
     return std::pair(std::move(sizes), std::move(likely));
   };
-  double roughness = 0;  // largest third difference of the log likelihood
+  double roughness = 0;  // It is the largest third difference of the log likelihood.
   for (int pass = 0; pass < far_passes; ++pass) {
     const EffectTerm term{&candidate, candidate.variants.front(), {best}};
     nuisance = fit(*this, nuisance, {term}, {.count = {}, .refit_effects = false}).nuisance;
@@ -475,8 +477,8 @@ void MachineTransitions::refine_far_size(FreeParameter& p, const Candidate& cand
   p.blur += sizes[1] - sizes[0];
 }
 
-// Seeks a likely size of each suspected effect of one parameter far from none of it: fits start from there, too. No
-// slope leads up a staircase.
+// Seeks a likely size of each suspected effect of one parameter far from none of it, from which fits start, too: the
+// slope at none leads up no staircase.
 void MachineTransitions::seek_far_sizes(const Fit& recalibrated) {
   for (Candidate& candidate : candidates_) {
     const bool suspected =
@@ -517,7 +519,7 @@ std::vector<double> MachineTransitions::levels_of_own_draws(const std::vector<do
 void MachineTransitions::require_own_draws(const Fit& recalibrated) const {
   const std::vector<double> levels = levels_of_own_draws(recalibrated.nuisance);
   const auto count = static_cast<double>(levels.size());
-  double apart = 0;  // Kolmogorov's distance
+  double apart = 0;  // It is Kolmogorov's distance.
   for (std::size_t i = 0; i < levels.size(); ++i)
     apart = std::max({apart, std::abs(levels[i] - static_cast<double>(i) / count),
                       std::abs(levels[i] - static_cast<double>(i + 1) / count)});

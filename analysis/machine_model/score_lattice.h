@@ -18,15 +18,15 @@ struct CellPart {
 CellPart cell_part(double centre, double spread, std::span<const std::pair<double, double>> inside);
 
 /// One axis of a lattice: the standard normal as a mixture of normals of sd `spread` at equal distances, exact to 1e-4
-/// of its density out to five sds. The first and last points have no such cell: they serve
-/// for slopes, and as the tails of an outlier's score.
+/// of its density out to five sds. The first and last points have no such cell: they serve for
+/// slopes, and as the tails of an outlier's score.
 struct LatticeAxis {
   double spread = 0, spacing = 0;
   std::vector<double> points;   ///< ascending
   std::vector<double> weights;  ///< of the cells, 0 for the first and the last; they add up to 1
   std::vector<double> shares;   ///< of the points, by which a mean over the standard normal is taken; they add up to 1
-  /// Of the cells, for the score of an outlier, N(0, outlier_width^2); the first and the last stand for the tails, all
-  /// that lies beyond the other cells. They add up to 1.
+  /// The weights that the cells have for an outlier's score, which is drawn from N(0, outlier_width^2); they add up to
+  /// 1. The first and the last are those of the tails, which hold all scores beyond the other cells.
   std::vector<double> wide_weights;
 
   bool in_tail(std::size_t point) const { return point == 0 || point + 1 == points.size(); }

@@ -56,13 +56,12 @@ constexpr Word until_failure[] = {
      "Expected steps from there are the fewest that a rolling wheel has."},
     {"relaunched", "the long-run mean if every wheel that rests is launched again at once", ""}};
 constexpr Word of_the_chain[] = {
-    {"quasi-stationary speed", "mean and sd of the speed in the metastable regime, just after a collision", ""},
+    {"quasi-stationary speed", "mean and sd of the speed in the metastable regime, just before a collision", ""},
     {"eigenvalue moduli", "shares that are left of differences between two wheels after a step, the largest first",
      "The first is the share of rolling wheels in the metastable regime that a step leaves rolling."},
     {"mixing", "how many steps it takes until the launch is forgotten",
-     "Spectral: the steps in which differences fade by a factor of e. Total variation: the steps from this launch "
-     "until "
-     "its distribution of speeds is within 0.05 of that of the regime."},
+     "The spectral number is that of the steps in which differences fade by a factor of e. The one of total variation "
+     "counts the steps from this launch until its distribution of speeds is within 0.05 of that of the regime."},
     {"resolution", "how finely the speeds are cut, and how many contacts are drawn, if any", ""},
     {"relative error", "what cells and draws leave open, as shares of the expected steps",
      "Discretization is the part of the cells, sampling that of the draws."}};

@@ -192,7 +192,7 @@ TEST(BlindGrade, ExpectedSteps) {
   misses.steps = {107, 130};
   misses.steps_counted = {95, 120};
   BlindAnswer beside = holds;
-  beside.steps = {101, 130};  // as far beside the count as this errs
+  beside.steps = {101, 130};  // It lies as far beside the count as this errs.
   beside.steps_counted.reset();
   open.steps = {90, std::numeric_limits<double>::infinity()};
   const BlindGrades g =

@@ -15,8 +15,8 @@ namespace {
 
 Eigen::MatrixXd covariance_of(const Fit& fit) { return markov::floored_inverse(fit.information, resolved_share); }
 
-// The likelihood of the logarithm l of a normal sd falls by n (d + (exp(-2 d) - 1) / 2) at l + d: further above than
-// below.
+// The likelihood of the logarithm l of a normal sd falls by n (d + (exp(-2 d) - 1) / 2) at l + d, so that its end above
+// is farther from l than the one below.
 TEST(LikelihoodEnds, OfTheNoiseOfFewRowsAreThoseOfItsLikelihood) {
   const double rows = 12;
   const test::Line model = test::line(0, 5, static_cast<std::size_t>(rows));

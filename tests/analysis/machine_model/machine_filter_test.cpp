@@ -163,7 +163,8 @@ double outlier_density(double z, double share) {
          share * dynamics::normal_density(z / outlier_width) / outlier_width;
 }
 
-// An outlier's noise is wide, not the belief of the state before it: of the second row, given the first and its error.
+// The noise of an outlier is wide, and not the belief of the state before it. The density is that of each second row,
+// given the first one and its error.
 TEST(MachineFilter, OutliersOfALinearMachineHaveTheirLikelihood) {
   const double error = 0.3, share = 0.1;
   const Machine machine = linear_machine(error);
@@ -186,7 +187,7 @@ TEST(MachineFilter, OutliersOfALinearMachineHaveTheirLikelihood) {
 // The map bends in an outlier's noise: x' = x / 2 + exp(z / 8) shows each z, which reaches the tails of the lattice.
 TEST(MachineFilter, OutliersWhereTheMapBendsHaveTheirLikelihood) {
   const double share = 0.1;
-  for (const double edge : {100.0, 9.0}) {  // above which the machine fails
+  for (const double edge : {100.0, 9.0}) {  // The machine fails above it.
     Machine machine = skewed_machine(0);
     machine.step = [edge](const MachineBatch& batch) {
       for (std::size_t i = 0; i < batch.rows; ++i) {
