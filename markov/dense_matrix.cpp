@@ -30,8 +30,9 @@ Eigen::MatrixXd resolved_root(const Eigen::MatrixXd& matrix, const Eigen::Vector
 }
 
 Eigen::MatrixXd floored_inverse(const Eigen::MatrixXd& matrix, double least_share) {
-  constexpr double least = 1e-12;  // of a diagonal, so that what has no information at all has an inverse
-  const Eigen::VectorXd unit = matrix.diagonal().cwiseMax(least).cwiseSqrt().cwiseInverse();
+  constexpr double unknown = 1e6;  // unit of what has no information at all, so that it has an inverse
+  const Eigen::VectorXd unit = matrix.diagonal().unaryExpr(
+      [](double information) { return information > 0 ? 1 / std::sqrt(information) : unknown; });
   const SymmetricEigen split = symmetric_eigen(unit.asDiagonal() * matrix * unit.asDiagonal());
   const Eigen::MatrixXd root = unit.asDiagonal() * split.vectors;
   return root * split.values.cwiseMax(least_share).cwiseInverse().asDiagonal() * root.transpose();

@@ -18,7 +18,8 @@ constexpr double least_odds = 0.05, largest_odds_in_place = 1e12;
 
 // Returns the place of the variation that says most by itself, by the facets it was weighed in; nothing where it was
 // none.
-std::optional<std::size_t> strongest_alone(const TransitionModel& model, const std::vector<LeftInFacet>& alone) {
+std::optional<std::size_t> strongest_alone(const TransitionModel& model, const std::vector<LeftInFacet>& alone,
+                                           const LeftInFacet** said = nullptr) {
   const LeftInFacet* most = nullptr;
   std::optional<std::size_t> place;
   for (std::size_t i = 0; i < model.variations().size(); ++i)
@@ -28,6 +29,7 @@ std::optional<std::size_t> strongest_alone(const TransitionModel& model, const s
         most = &left;
         place = i;
       }
+  if (said) *said = most;
   return place;
 }
 
@@ -80,6 +82,17 @@ std::optional<InPlace> varies_without_name(const TransitionModel& model, const s
   const auto most = std::ranges::max_element(alone, {}, &LeftInFacet::evidence);
   if (most->facet != one.facet || most->aspect != one.aspect) return {};
   return InPlace{*place, most->quadratic, 0};
+}
+
+const Variation* same_variation(const TransitionModel& model, const RankedCause& best,
+                                const std::vector<LeftInFacet>& alone, const Rules& rules) {
+  if (best.terms.size() != 1) return nullptr;
+  const LeftInFacet* said = nullptr;
+  const std::optional<std::size_t> place = strongest_alone(model, alone, &said);
+  if (!place) return nullptr;
+  const Variation& one = model.variations()[*place];
+  const bool named = std::ranges::find(one.named, best.terms.front().candidate->id) != one.named.end();
+  return named && said->quadratic < best.gain + rules.told_apart ? &one : nullptr;
 }
 
 std::optional<InPlace> in_place_of_effects(const TransitionModel& model, const CauseRanking& ranking,

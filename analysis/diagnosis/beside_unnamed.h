@@ -26,6 +26,11 @@ struct InPlace {
 /// @param alone  what varies at the recalibrated model, and what that leaves, by facet
 std::optional<InPlace> varies_without_name(const TransitionModel& model, const std::vector<LeftInFacet>& alone);
 
+/// Returns the variation that says most of all that may act alone, where it is what the hypothesis names: that is one
+/// effect of Variation::named, and gains as much up to Rules::told_apart. Else nullptr.
+const Variation* same_variation(const TransitionModel& model, const RankedCause& best,
+                                const std::vector<LeftInFacet>& alone, const Rules& rules);
+
 /// Finds the variation that fits best in the place of one effect of a hypothesis of several, the others kept. Of one
 /// effect the variations at the recalibrated model say so. Nothing where none is clearly likelier than the
 /// effect, by 1 / Rules::most_odds_of_none().

@@ -41,7 +41,9 @@ void set_smallest(Detectability& v, const ScannedEffect& scanned, double size) {
   for (const FreeParameter& one : scanned.candidate->parameters) values.push_back(one.neutral);
   const std::vector<double>& variant = scanned.candidate->variants[scanned.best];
   const auto neutral = scanned.candidate->report(variant, values);
-  values[0] = std::clamp(p.neutral + size, p.lower, p.upper);
+  const bool upwards = p.upper > p.neutral;  // An effect may have room below none only.
+  const double room = upwards ? p.upper - p.neutral : p.neutral - p.lower;
+  values[0] = p.neutral + (upwards ? 1 : -1) * std::min(size, room);
   const auto seen = scanned.candidate->report(variant, values);
   for (std::size_t k = 0; k < seen.size(); ++k)
     if (seen[k].second != neutral[k].second) {
@@ -49,8 +51,8 @@ void set_smallest(Detectability& v, const ScannedEffect& scanned, double size) {
       v.smallest = std::abs(seen[k].second - neutral[k].second);
       break;
     }
-  v.times_more = std::pow(size / (p.upper - p.neutral), 2);
-  if (p.neutral + size > p.upper) v.undecidable = "it would have to pass its range to be seen";
+  v.times_more = std::pow(size / room, 2);
+  if (size > room) v.undecidable = "it would have to pass its range to be seen";
 }
 
 // Asks along the direction in which the effect was found (or its first parameter) what others explain of it.

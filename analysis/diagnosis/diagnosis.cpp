@@ -27,6 +27,7 @@
 #include "analysis/diagnosis/verdict.h"
 #include "analysis/fitting/bayes_factor.h"
 #include "analysis/fitting/cause_ranking.h"
+#include "analysis/fitting/far_sizes.h"
 #include "analysis/gap/collision_profile.h"
 #include "analysis/gap/facet_evidence.h"
 #include "analysis/gap/fitted_variations.h"
@@ -369,7 +370,7 @@ Named name_beside_unnamed(const TransitionModel& model, const Fitted& fitted, co
   Odds asked = chosen.unnamed;
   std::optional<InPlace> there;
   if (const RankedCause* best = hypotheses.best();
-      without &&
+      without && !chosen.same &&
       chosen.supposed.front().evidence - best->evidence > std::log(d.rules.most_odds_of_none() / d.rules.unnamed_alone))
     there = varies_without_name(model, alone);
   if (there) asked = {.alone = 0, .beside = asked.beside, .left = d.rules.certain_odds};
@@ -429,6 +430,7 @@ struct Decided {
   Hypotheses ranked;
   const Fit* cause;  // of the best hypothesis, or the recalibrated model
   HeldOutGap held_out;
+  const Variation* same = nullptr;     // Chosen::same
   std::optional<FitsWithout> without;  // of the best hypothesis; nothing where it is the recalibrated model
 };
 Decided decide(const TransitionModel& model, const Fitted& fitted, const std::vector<const Candidate*>& candidates,
@@ -447,8 +449,12 @@ Decided decide(const TransitionModel& model, const Fitted& fitted, const std::ve
   decided.ranked = hypotheses(model, fitted.ranking);
   Chosen chosen = best_hypothesis(model, fitted, decided.ranked, std::move(found), tested.gap, options);
   decided.cause = chosen.fit;
-  if (chosen.fit != &fitted.recalibrated)
+  if (chosen.fit != &fitted.recalibrated) {
+    chosen.same = same_variation(model, *decided.ranked.best(), chosen.supposed.front().facets, options.rules);
+    if (chosen.same) chosen.unnamed.alone = 0;  // What varies so has the name.
+    decided.same = chosen.same;
     decided.without.emplace(model, fitted.ranking, *decided.ranked.best(), fitted.recalibrated);
+  }
   if (const std::optional<TrialGroups> two =
           trial_groups(model, fitted.ranking.scan, fitted.recalibrated, *chosen.fit, options.seed))
     d.data.notes.push_back(trial_groups_in_words(model, *two));
@@ -481,9 +487,9 @@ void doubt_effects(Diagnosis& d, const std::vector<const Candidate*>& candidates
 }
 
 // Puts the answer together from what each stage says.
-Diagnosis answer(const TransitionModel& model, const Fitted& fitted, const std::vector<const Candidate*>& candidates,
-                 const Elsewhere& elsewhere, const DiagnosisOptions& options, const Progress& progress) {
-  Decided decided = decide(model, fitted, candidates, options, progress);
+Diagnosis answer(const TransitionModel& model, const Fitted& fitted, Decided decided,
+                 const std::vector<const Candidate*>& candidates, const Elsewhere& elsewhere,
+                 const DiagnosisOptions& options, const Progress& progress) {
   Diagnosis& d = decided.d;
   const std::vector<const RankedCause*>& ordered = decided.ranked.ordered;
   const RankedCause* best = decided.ranked.best();
@@ -495,9 +501,11 @@ Diagnosis answer(const TransitionModel& model, const Fitted& fitted, const std::
   }
 
   if (best && (d.verdict == Verdict::explained || d.verdict == Verdict::partly_explained))
-    d.causes.even_push = even_push_in_words(model, fitted.recalibrated, *best, d.rules, options.threads);
+    d.causes.even_push = decided.same ? same_push_in_words(*decided.same)
+                                      : even_push_in_words(model, fitted.recalibrated, *best, d.rules, options.threads);
   progress(0.88, "steps before failure");
   d.shrinkage.steps = steps_before_failure(model, fitted.given.nuisance, fitted.recalibrated, cause, options.seed);
+  d.shrinkage.steps.later = later_steps(model, cause);
   if (const auto [at_risk, rests] = model.rests(); at_risk > 0 && !d.shrinkage.measures.empty())
     d.shrinkage.measures.push_back(rest_shrinkage(
         at_risk, rests, d.shrinkage.steps,
@@ -560,7 +568,22 @@ Diagnosis diagnose(const TransitionModel& model, const DiagnosisOptions& options
   const Progress progress = told_to(options);
   progress(0, "the model as given");
   const Elsewhere elsewhere = asked_elsewhere(model, options);
-  return answer(model, fit_models(model, candidates, options, progress), candidates, elsewhere, options, progress);
+  const Fitted fitted = fit_models(model, candidates, options, progress);
+  Decided decided = decide(model, fitted, candidates, options, progress);
+  // Where something has no name, an effect may have been missed whose likely size no slope leads to.
+  if (decided.d.verdict == Verdict::unexplained || decided.d.verdict == Verdict::partly_explained) {
+    const std::vector<Candidate> far =
+        with_far_sizes(model, fitted.recalibrated, candidates, fitted.ranking.singles, options.threads);
+    if (!far.empty()) {
+      std::vector<const Candidate*> again;
+      for (const Candidate& candidate : far) again.push_back(&candidate);
+      const Progress rest = [&](double share, const char* doing) { progress(0.86 + 0.14 * share, doing); };
+      const Fitted fitted_again = fit_models(model, again, options, rest);
+      return answer(model, fitted_again, decide(model, fitted_again, again, options, rest), again, elsewhere, options,
+                    rest);
+    }
+  }
+  return answer(model, fitted, std::move(decided), candidates, elsewhere, options, progress);
 }
 
 std::vector<Diagnosis> decide_each(const TransitionModel& model, const DiagnosisOptions& options,

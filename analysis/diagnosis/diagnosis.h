@@ -180,7 +180,7 @@ struct Diagnosis {
     std::vector<std::string> alike;
     std::vector<StepwiseChoice> stepwise;  ///< what the field's usual selection names, for comparison
     std::string size;                      ///< of the likeliest beside the nominal model, a sentence; or empty
-    std::string even_push;                 ///< a sentence that says that a push fits as well; or empty
+    std::string even_push;                 ///< a sentence that says that a push, or one by a facet, fits as well; or ""
     /// These are probabilities. A gap has at least even odds where the tests find one, else at most even ones.
     double p_no_gap = 0, p_recalibrate = 0, p_none = 0;
     double together = 1;          ///< of the best hypothesis, if of several effects: see Rules::most_together
@@ -232,7 +232,8 @@ Diagnosis diagnose(const TransitionModel& model, const DiagnosisOptions& options
 Diagnosis diagnose(std::shared_ptr<const TransitionModel> model, const DiagnosisOptions& options = {});
 
 /// Decides under each of several sets of rules (DiagnosisOptions::rules does not count): data, gap, causes and verdict
-/// are what diagnose() finds, and the rest of the answer is left out. What is fitted alike is fitted once.
+/// are what diagnose() finds before sizes far from none are sought, and the rest of the answer is left out. What is
+/// fitted alike is fitted once.
 /// @throws as diagnose()
 std::vector<Diagnosis> decide_each(const TransitionModel& model, const DiagnosisOptions& options,
                                    const std::vector<Rules>& rules);

@@ -185,6 +185,14 @@ void say_unexplained(std::vector<std::string>& s, const Diagnosis& d) {
         "A gap shows beyond chance (p = {:.2g}), and no effect of the catalogue clearly removes it.", d.gap.p_value));
     s.push_back(without_effect_in_words(d));
   } else if (any && d.causes.ranked.front().probability > d.causes.p_none) {
+    if (without_effect(d) > d.causes.p_none) {
+      s.push_back(fmt::format(
+          "A gap shows beyond chance (p = {:.2g}). The nearest of the catalogue is {}, with probability {:.2f}, too "
+          "little for a name.",
+          d.gap.p_value, with_parameters(d.causes.ranked.front()), d.causes.ranked.front().probability));
+      s.push_back(without_effect_in_words(d));
+      return;
+    }
     s.push_back(
         fmt::format("There is a gap that recalibration does not remove. The nearest of the catalogue is {}; "
                     "that it is none of the catalogue has probability {:.2f}, too much for a name.",
@@ -258,11 +266,29 @@ void say_what_closes(std::vector<std::string>& s, const Diagnosis& d) {
   }
 }
 
+// Says that failures come mostly at the beginning of trials, or mostly at their end: expected steps are those of trials
+// as long as the measured ones.
+void say_later_steps(std::vector<std::string>& s, const Diagnosis& d) {
+  const StepsBeforeFailure& steps = d.shrinkage.steps;
+  if (steps.machine.empty() || steps.machine.front().at_least || !(steps.later > 0)) return;
+  const double ratio = steps.later / steps.machine.front().steps.value;
+  if (ratio < d.rules.later_apart && ratio > 1 / d.rules.later_apart) return;
+  s.push_back(
+      fmt::format("That is for trials as long as these: in the later half of their {0}s {1}, so that trials without an "
+                  "end take {2} "
+                  "{0}s than that on average.",
+                  d.data.step_name,
+                  std::isfinite(steps.later)
+                      ? fmt::format("the model fails once in {}", format_number(steps.later, NumberFormat::general, 2))
+                      : "the model does not fail",
+                  ratio > 1 ? "more" : "fewer"));
+}
+
 // Says the expected steps of the machine itself, as measured and where they were asked.
 void say_machine_steps(std::vector<std::string>& s, const Diagnosis& d) {
   for (const MachineSteps& machine : d.shrinkage.steps.machine) {
     // Trials of a machine end after some steps, and their first ones may fail more seldom than later ones.
-    const std::string where = !machine.where.empty()       ? " " + machine.where
+    const std::string where = !machine.where.empty()       ? " " + machine.where + ", in trials as long as these"
                               : d.data.step_name == "step" ? " in trials like these"
                                                            : "";
     if (machine.at_least) {
@@ -276,6 +302,7 @@ void say_machine_steps(std::vector<std::string>& s, const Diagnosis& d) {
     s.push_back(fmt::format("This machine takes {} {}s before failure{} (90 %: {} to {}).", plain_text(steps.value),
                             d.data.step_name, where, plain_text(steps.lower), plain_text(steps.upper)));
   }
+  say_later_steps(s, d);
 }
 
 void say_what_is_hidden(std::vector<std::string>& s, const Diagnosis& d) {

@@ -29,4 +29,11 @@ std::string even_push_in_words(const TransitionModel& model, const Fit& recalibr
       model.step_name(), fmt::join(by, ", "), gain, of_best);
 }
 
+std::string same_push_in_words(const Variation& same) {
+  return fmt::format(
+      "These data show no more of it than that the {} goes by {}, which fits as well: an effect outside the catalogue "
+      "that does so would get this name.",
+      same.aspect, same.facet);
+}
+
 }  // namespace metastable::analysis

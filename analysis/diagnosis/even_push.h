@@ -16,4 +16,8 @@ namespace metastable::analysis {
 std::string even_push_in_words(const TransitionModel& model, const Fit& recalibrated, const RankedCause& best,
                                const Rules& rules, int threads);
 
+/// Returns a sentence that a variation without a name is all that the data show of the effect that is named.
+/// @param same  same_variation()
+std::string same_push_in_words(const Variation& same);
+
 }  // namespace metastable::analysis

@@ -45,12 +45,17 @@ Fit drawn_fit(const TransitionModel& model, const Fit& fit, std::uint64_t seed, 
     const Eigen::VectorXd moved = model.nuisances()[p].form_sd / by_data(at, at) * by_data.col(at);
     covariance += moved * moved.transpose();
   }
-  const markov::SymmetricEigen split = markov::symmetric_eigen(covariance);
+  // Parameters may have units that are far apart: the matrix is split in units of its diagonal.
+  const Eigen::VectorXd unit = covariance.diagonal().cwiseMax(0).cwiseSqrt();
+  const Eigen::VectorXd inverse = unit.unaryExpr([](double one) { return one > 0 ? 1 / one : 0; });
+  const markov::SymmetricEigen split =
+      markov::symmetric_eigen(inverse.asDiagonal() * covariance * inverse.asDiagonal());
   const std::vector<double> normals =
       normal_multipliers(seed, draw, DrawStream::steps, static_cast<std::size_t>(covariance.rows()));
   Eigen::VectorXd shift = Eigen::VectorXd::Zero(covariance.rows());
   for (Eigen::Index k = 0; k < shift.size(); ++k)
     shift += std::sqrt(std::max(0.0, split.values[k])) * normals[static_cast<std::size_t>(k)] * split.vectors.col(k);
+  shift = shift.cwiseProduct(unit);
   Eigen::Index at = 0;
   for (std::size_t p = 0; p < drawn.nuisance.size(); ++p) {
     const Nuisance& n = model.nuisances()[p];
@@ -234,6 +239,19 @@ MachineSteps survivors_steps(const std::string& where, double model_lower, const
   return {where, {infinite, std::max({1.0, seen, known}), infinite}, true};
 }
 
+double later_steps(const TransitionModel& model, const Fit& fit) {
+  const std::vector<Event>& events = model.events();
+  const std::vector<double> chances = model.rest_chances(fit.nuisance, fit.terms);
+  int last = 0;
+  for (const Event& event : events)
+    if (event.rested) last = std::max(last, event.number);
+  double at_risk = 0, failures = 0;
+  for (std::size_t e = 0; e < events.size(); ++e)
+    if (events[e].rested && 2 * events[e].number > last) ++at_risk, failures += chances[e];
+  if (!(at_risk > 0) || last < 2) return 0;
+  return failures > 0 ? at_risk / failures : infinite;
+}
+
 void add_machine_steps(Diagnosis& d, const TransitionModel& model, const WeighedFit& recalibrated,
                        const std::vector<WeighedFit>& fits, const Elsewhere& elsewhere, const DiagnosisOptions& options,
                        const std::function<void()>& heartbeat) {
@@ -244,8 +262,14 @@ void add_machine_steps(Diagnosis& d, const TransitionModel& model, const Weighed
   };
   const std::vector<double> of_plain = draw(model, plain, fits.empty() ? draws_of_machine : draws_of_recalibrated);
   const std::vector<double> of_effects = fits.empty() ? of_plain : draw(model, fits, draws_of_machine);
-  s.recalibrated_90 = interval_of_draws(of_plain);
-  s.with_effect_90 = is_gap(d.verdict) ? interval_of_draws(of_effects) : s.recalibrated_90;
+  // A few draws may miss the number that stands beside their interval, which is another draw where it is simulated.
+  const auto about = [](Estimate interval, double value) {
+    interval.lower = std::min(interval.lower, value);
+    interval.upper = std::max(interval.upper, value);
+    return interval;
+  };
+  s.recalibrated_90 = about(interval_of_draws(of_plain), s.recalibrated);
+  s.with_effect_90 = is_gap(d.verdict) ? about(interval_of_draws(of_effects), s.with_effect) : s.recalibrated_90;
   const auto [at_risk, rests] = model.rests();
   const ModelError error = model_error(d);
   const auto add = [&](const std::string& where, const std::vector<double>& there) {

@@ -70,6 +70,10 @@ Estimate bounded_by_count(const Estimate& joined, const StepsBeforeFailure& coun
 MachineSteps survivors_steps(const std::string& where, double model_lower, const StepsBeforeFailure& counted,
                              bool explained);
 
+/// Returns StepsBeforeFailure::later under a fit: infinity where no failure is to be expected in the later half, 0
+/// where outcomes are not known or all steps are of one number.
+double later_steps(const TransitionModel& model, const Fit& fit);
+
 /// Fills in the intervals of the models' expected steps, and the machine's own; none where neither the models nor the
 /// count bound them.
 /// @param fits  the models that may be the machine, by their probabilities (none: the recalibrated model alone)

@@ -48,6 +48,7 @@ struct Chosen {
   Odds unnamed = {};                   ///< of something else, in its place or beside it
   double bent = 1;                     ///< share of its gain that an error of form may bend
   double together = 1;                 ///< RankedCause::together
+  const Variation* same = nullptr;     ///< varies as the one effect does that is named, see same_variation()
 };
 
 /// Chooses the first of the hypotheses. What it leaves on the map is judged beyond its own model error.

@@ -142,12 +142,14 @@ std::vector<ScannedColumn> list_columns(const std::vector<ScannedTerm>& terms) {
 void differentiate(const TransitionModel& model, const Fit& fit, const ScannedColumn& scanned, const ScanBeside& beside,
                    Derivatives& all) {
   double step = first_step(beside, *scanned.term, scanned.parameter);
+  const FreeParameter& p = scanned.term->candidate->parameters[scanned.parameter];
+  const double way = p.upper > p.neutral ? 1 : -1;  // An effect may have room below none only.
   for (int attempt = 0; attempt < 2; ++attempt) {
     std::vector<EffectTerm> moved = fit.terms;
     moved.push_back(*scanned.term);
-    moved.back().values[scanned.parameter] += step;
+    moved.back().values[scanned.parameter] += way * step;
     const Evaluation there = model.evaluate(fit.nuisance, moved);
-    fill_differences(fit.evaluation, there, step, scanned.column, all);
+    fill_differences(fit.evaluation, there, way * step, scanned.column, all);
     const double resolved = 1 / std::sqrt(std::max(1e-300, all.change.col(scanned.column).squaredNorm()));
     if (step < largest_step * resolved) break;
     step = small_step * resolved;
@@ -319,8 +321,12 @@ Eigen::MatrixXd rows_of_chance(const EffectScan& scan) {
   const double trials = static_cast<double>(rows.rows());
   const Eigen::ArrayXd scatter = rows.colwise().squaredNorm().transpose() * (trials / std::max(1.0, trials - 1));
   const Eigen::ArrayXd own = scan.information.diagonal().cwiseMax(resolved_share * scan.whole).array().max(1e-300);
-  const markov::SymmetricEigen split = markov::symmetric_eigen(scan.information);
-  rows = split.values.cwiseMax(0).cwiseSqrt().asDiagonal() * split.vectors.transpose() *
+  // Parameters may have units that are far apart: the matrix is split in units of its diagonal.
+  const Eigen::VectorXd unit = scan.information.diagonal().cwiseMax(0).cwiseSqrt();
+  const Eigen::VectorXd inverse = unit.unaryExpr([](double one) { return one > 0 ? 1 / one : 0; });
+  const markov::SymmetricEigen split =
+      markov::symmetric_eigen(inverse.asDiagonal() * scan.information * inverse.asDiagonal());
+  rows = split.values.cwiseMax(0).cwiseSqrt().asDiagonal() * split.vectors.transpose() * unit.asDiagonal() *
          (scatter / own).max(1).sqrt().matrix().asDiagonal();
   return rows;
 }

@@ -26,6 +26,7 @@ constexpr int most_halvings = 7, few_halvings = 3;  // of a step; of one that is
 // A step that rises by so many times what it foretold is too short. It is made longer, by so many times at most.
 constexpr double much_more = 1.25, longest = 8;
 constexpr int rough_steps = 2;             // A fit that is only looked at takes so many steps by another one's slopes.
+constexpr double largest_change = 1e5;     // of an event's log density or score, over the step of a difference
 constexpr double difference_share = 0.05;  // step of a difference, of what the data resolve
 constexpr double widening = 8;             // factor on that step where kinks of single events' densities hide a slope
 
@@ -133,9 +134,9 @@ Derivatives differences(const TransitionModel& model, Point& point, const Evalua
     for (Eigen::Index i = 0; i < events; ++i) {
       const auto k = static_cast<std::size_t>(i);
       // Events at the floor of the density have no slope there.
-      d.slope(i, static_cast<Eigen::Index>(p)) =
-          std::clamp((up.log_density[k] - from.log_density[k]) / step, -1e9, 1e9);
-      d.change(i, static_cast<Eigen::Index>(p)) = std::clamp((up.score[k] - from.score[k]) / step, -1e9, 1e9);
+      const auto bounded = [](double difference) { return std::clamp(difference, -largest_change, largest_change); };
+      d.slope(i, static_cast<Eigen::Index>(p)) = bounded(up.log_density[k] - from.log_density[k]) / step;
+      d.change(i, static_cast<Eigen::Index>(p)) = bounded(up.score[k] - from.score[k]) / step;
     }
   }
   return d;

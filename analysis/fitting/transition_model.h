@@ -115,12 +115,16 @@ struct Candidate {
   std::string undecidable;
   /// If true, reality has no other form of it than this one: none of its gain is forgiven as an error of form.
   bool exact = false;
+  /// If true, likely sizes far from none are sought where fits leave a gap without a name (far_sizes.h): it has one
+  /// parameter and one variant.
+  bool seek_far = false;
 };
 
 /// A variation without a name, as it is fitted: something varies in a way that no effect of the catalogue has.
 struct Variation {
   std::string facet, aspect;  ///< what it goes by, and what of the contact varies
   Candidate candidate;
+  std::vector<std::string> named = {};  ///< effects that go by the same, with as many numbers
 };
 
 /// A hypothesis adds candidates with values.

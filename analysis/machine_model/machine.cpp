@@ -43,7 +43,17 @@ void require_parameter(const MachineParameter& p) {
                                             p.name, p.nominal, p.lower, p.upper));
 }
 
+// These words stand for answers without an effect, and a plus sign joins several effects.
+void require_own_name(const std::string& id) {
+  for (const char* taken : {"no_gap", "recalibration", "none_of_these"})
+    if (id == taken)
+      throw std::invalid_argument(fmt::format("effects: \"{}\" is a name that answers give to no effect", id));
+  if (id.find('+') != std::string::npos)
+    throw std::invalid_argument(fmt::format("effects: \"{}\": a name holds no +, which joins several effects", id));
+}
+
 void require_effect(const MachineEffect& effect) {
+  require_own_name(effect.id);
   if (effect.parameters.empty()) throw std::invalid_argument(fmt::format("effects: {}: has no parameter", effect.id));
   for (const SuspectedParameter& p : effect.parameters) {
     const std::string what = fmt::format("effects: {}: {}", effect.id, p.name);

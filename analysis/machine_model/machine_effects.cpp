@@ -54,6 +54,7 @@ MachineCandidate suspected(const MachineEffect& effect, std::size_t first) {
     one.candidate.parameters.push_back({p.neutral, p.lower, p.upper, fine_step * (p.upper - p.lower)});
     names.push_back(p.name);
   }
+  one.candidate.seek_far = effect.parameters.size() == 1;
   one.candidate.report = reporting({}, std::move(names));
   one.apply = [first](MachineHypothesis& h, const Values&, const Values& v) {
     for (std::size_t i = 0; i < v.size(); ++i) h.values[first + i] = v[i];

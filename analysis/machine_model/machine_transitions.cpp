@@ -29,15 +29,7 @@ namespace {
 
 constexpr double least_sensor = 1e-6, usual_sensor = 0.1;  // sd of an error that is not stated, in sds of its change
 constexpr double sensor_prior = 3;                         // sd of its logarithm
-constexpr double far_shares[]{1.0 / 32, 1.0 / 8,
-                              1.0 / 2};        // Sizes are tried at these shares of the way from none to a bound.
-constexpr int far_passes = 2, far_rounds = 4;  // Rounds about the best size are each three times as fine as the last.
-// A likelihood is a staircase if its third difference near the top exceeds so many nats, where smooth ones have none.
-constexpr double rough_stairs = 0.5;
-// Sizes are then compared within this share of the size, so many to a side; those within so many nats are as likely.
-constexpr double stairs_reach = 0.15, stairs_fall = 3;
-constexpr int stairs_to_a_side = 40;
-constexpr std::size_t enough_levels = 5000;  // Chance moves the distribution of so many values by 0.01.
+constexpr std::size_t enough_levels = 5000;                // Chance moves the distribution of so many values by 0.01.
 constexpr std::uint64_t most_own_draws = 20, own_seed = 0x6f776e;
 constexpr double usual_wild = -7, wild_prior = 1.5, least_wild = -12;  // logit of the share of wild rows
 constexpr double parameter_step = 1e-3;  // of the sd with which it is known, for differences
@@ -182,10 +174,6 @@ class MachineTransitions : public TransitionModel {
   std::unique_ptr<MachineTransitions> with_wide_priors() const;
   bool effect_speaks_for_what_is_stated(const Fit& recalibrated, const Fit& wide) const;
   void set_aside_what_is_misstated(const Fit& recalibrated);
-  std::vector<double> likely_with(const Candidate& candidate, const std::vector<double>& nuisance,
-                                  std::vector<double>& sizes) const;
-  void refine_far_size(FreeParameter& p, const Candidate& candidate, double best, std::vector<double> nuisance) const;
-  void seek_far_sizes(const Fit& recalibrated);
   std::vector<double> levels_of_own_draws(const std::vector<double>& nuisance) const;
   std::vector<std::string> effects_instead(const Fit& recalibrated) const;
 
@@ -430,72 +418,6 @@ void MachineTransitions::set_aside_what_is_misstated(const Fit& recalibrated) {
   for (const std::size_t one : slots) nuisances_[one].misstated = 1;
 }
 
-// Returns the log likelihood of the runs with each of these sizes of an effect of one parameter. Sizes beyond its
-// bounds are set to these.
-std::vector<double> MachineTransitions::likely_with(const Candidate& candidate, const std::vector<double>& nuisance,
-                                                    std::vector<double>& sizes) const {
-  const FreeParameter& p = candidate.parameters[0];
-  std::vector<double> likely(sizes.size());
-  side_by_side(sizes.size(), 1, [&](std::size_t i) {
-    sizes[i] = std::clamp(sizes[i], p.lower, p.upper);
-    const EffectTerm term{&candidate, candidate.variants.front(), {sizes[i]}};
-    likely[i] = evaluate(nuisance, {&term, 1}).total();
-  });
-  return likely;
-}
-
-// Sets the likely size of an effect, which it seeks in ever finer steps about a size that is likelier than none. An
-// effect that moves a threshold makes the likelihood a staircase: its sizes that are about as likely set the blur.
-void MachineTransitions::refine_far_size(FreeParameter& p, const Candidate& candidate, double best,
-                                         std::vector<double> nuisance) const {
-  const auto about = [&](double reach, int to_a_side) {
-    std::vector<double> sizes;
-    for (int k = -to_a_side; k <= to_a_side; ++k) sizes.push_back(best + reach * k / to_a_side);
-    std::vector<double> likely = likely_with(candidate, nuisance, sizes);
-    best = sizes[static_cast<std::size_t>(std::ranges::max_element(likely) - likely.begin())];
-    return std::pair(std::move(sizes), std::move(likely));
-  };
-  double roughness = 0;  // It is the largest third difference of the log likelihood.
-  for (int pass = 0; pass < far_passes; ++pass) {
-    const EffectTerm term{&candidate, candidate.variants.front(), {best}};
-    nuisance = fit(*this, nuisance, {term}, {.count = {}, .refit_effects = false}).nuisance;
-    double reach = std::abs(best - p.neutral);
-    for (int round = 0; round < far_rounds; ++round, reach /= 3) {
-      const std::vector<double> likely = about(reach, 4).second;
-      roughness = 0;
-      for (std::size_t i = 3; i < likely.size(); ++i)
-        roughness = std::max(roughness, std::abs(likely[i] - 3 * likely[i - 1] + 3 * likely[i - 2] - likely[i - 3]));
-    }
-  }
-  p.likely = best;
-  if (roughness < rough_stairs) return;
-  const auto [sizes, likely] = about(stairs_reach * std::abs(best - p.neutral), stairs_to_a_side);
-  p.likely = best;
-  const double most = *std::ranges::max_element(likely);
-  for (std::size_t i = 0; i < sizes.size(); ++i)
-    if (likely[i] > most - stairs_fall) p.blur = std::max(p.blur, std::abs(sizes[i] - best));
-  p.blur += sizes[1] - sizes[0];
-}
-
-// Seeks a likely size of each suspected effect of one parameter far from none of it, from which fits start, too: the
-// slope at none leads up no staircase.
-void MachineTransitions::seek_far_sizes(const Fit& recalibrated) {
-  for (Candidate& candidate : candidates_) {
-    const bool suspected =
-        std::ranges::find(machine_->effects, candidate.id, &MachineEffect::id) != machine_->effects.end();
-    if (!suspected || candidate.parameters.size() != 1) continue;
-    FreeParameter& p = candidate.parameters[0];
-    std::vector<double> sizes;
-    for (const double share : far_shares)
-      for (const double end : {p.lower, p.upper})
-        if (end != p.neutral) sizes.push_back(p.neutral + share * (end - p.neutral));
-    const std::vector<double> likely = likely_with(candidate, recalibrated.nuisance, sizes);
-    const auto best = std::ranges::max_element(likely);
-    if (best == likely.end() || *best < recalibrated.log_likelihood + Rules{}.told_apart / 2) continue;
-    refine_far_size(p, candidate, sizes[static_cast<std::size_t>(best - likely.begin())], recalibrated.nuisance);
-  }
-}
-
 // Returns, in ascending order, the levels of the measured values of runs drawn from the model: the share of values
 // below each, of those of rows that go on. They are uniform where the likelihood is that of what is drawn.
 std::vector<double> MachineTransitions::levels_of_own_draws(const std::vector<double>& nuisance) const {
@@ -581,9 +503,8 @@ std::vector<std::string> MachineTransitions::misstated(const Fit& recalibrated) 
 
 std::unique_ptr<TransitionModel> machine_transitions(std::shared_ptr<const Machine> machine, MachineRuns runs) {
   auto model = std::make_unique<MachineTransitions>(refusing_nan(std::move(machine)), std::move(runs));
-  const Fit recalibrated = fit(*model, nominal_values(*model), {});
+  const Fit recalibrated = best_fit(*model, nominal_values(*model), {});
   model->set_aside_what_is_misstated(recalibrated);
-  model->seek_far_sizes(recalibrated);
   return model;
 }
 

@@ -22,6 +22,7 @@ struct Facet {
   std::string name;
   std::size_t parameters;
   Weight weight;
+  std::vector<std::string> named = {};  // effects that go by it with one number, too
 };
 
 double wave(double share, std::size_t parameter) {
@@ -31,6 +32,13 @@ double wave(double share, std::size_t parameter) {
 
 std::vector<Facet> facets(const Machine& machine, const MachineDesign& design) {
   std::vector<Facet> all;
+  // A parameter that differs between two values of a column is one number.
+  const auto of_two = [&](std::size_t values, const std::string& column) {
+    std::vector<std::string> named;
+    for (std::size_t k = 0; values == 2 && k < machine.may_vary.size(); ++k)
+      named.push_back(machine.may_vary[k] + "_by_" + column);
+    return named;
+  };
   for (std::size_t j = 0; j < machine.observe.size(); ++j)
     all.push_back({machine.observe[j].state, 2, [j](const StepPlace& at, std::size_t i) {
                      const double x = std::clamp(at.seen[j], -4.0, 4.0);
@@ -38,7 +46,8 @@ std::vector<Facet> facets(const Machine& machine, const MachineDesign& design) {
                    }});
   if (design.phases.size() > 1)
     all.push_back({"phase", design.phases.size() - 1,
-                   [](const StepPlace& at, std::size_t i) { return at.phase == static_cast<int>(i) ? 1.0 : 0.0; }});
+                   [](const StepPlace& at, std::size_t i) { return at.phase == static_cast<int>(i) ? 1.0 : 0.0; },
+                   of_two(design.phases.size(), "phase")});
   if (design.trials > 4)
     all.push_back(
         {"order of trials", 2 * waves, [](const StepPlace& at, std::size_t i) { return wave(at.run + 0.5, i); }});
@@ -59,7 +68,8 @@ std::vector<Facet> facets(const Machine& machine, const MachineDesign& design) {
     if (design.labels[l].values.size() > 1)
       all.push_back(
           {design.labels[l].name, design.labels[l].values.size() - 1,
-           [l](const StepPlace& at, std::size_t i) { return at.labels[l] == static_cast<int>(i) ? 1.0 : 0.0; }});
+           [l](const StepPlace& at, std::size_t i) { return at.labels[l] == static_cast<int>(i) ? 1.0 : 0.0; },
+           of_two(design.labels[l].values.size(), design.labels[l].name)});
   return all;
 }
 
@@ -67,6 +77,7 @@ MachineVariation variation(const Facet& facet, const std::string& aspect, double
   MachineVariation one;
   one.variation.facet = facet.name;
   one.variation.aspect = aspect;
+  one.variation.named = facet.named;
   one.variation.candidate.id = aspect + " by " + facet.name;
   one.variation.candidate.parameters.assign(facet.parameters, {0, -most, most, step * most});
   return one;

@@ -45,9 +45,10 @@ std::unique_ptr<TolerantStarts::Tolerant> TolerantStarts::tolerant() const {
   auto found = std::make_unique<Tolerant>();
   found->model = machine_transitions(without_wild_rows(*machine_, times_the_error), runs_);
   found->recalibrated = fit(*found->model, nominal_values(*found->model), {});
-  if (!many_far_off(*machine_transitions(without_wild_rows(*machine_, 1), runs_), found->recalibrated.nuisance,
-                    machine_->most_wild))
-    return nullptr;
+  const std::unique_ptr<TransitionModel> strict = machine_transitions(without_wild_rows(*machine_, 1), runs_);
+  found->for_effects = many_far_off(*strict, found->recalibrated.nuisance, machine_->most_wild);
+  if (!found->for_effects)
+    return many_far_off(*strict, nominal_values(*strict), machine_->most_wild) ? std::move(found) : nullptr;
   std::vector<const Candidate*> all;
   for (const Candidate& candidate : found->model->candidates()) all.push_back(&candidate);
   found->scan = scan_effects(*found->model, found->recalibrated, all, 1);
@@ -60,7 +61,7 @@ void TolerantStarts::prepare() const {
 
 std::vector<FitStart> TolerantStarts::starts(std::span<const EffectTerm> terms) const {
   prepare();
-  if (!tolerant_) return {};
+  if (!tolerant_ || (!tolerant_->for_effects && !terms.empty())) return {};
   const TransitionModel& model = *tolerant_->model;
   std::vector<EffectTerm> same;
   for (const EffectTerm& term : terms) {

@@ -15,7 +15,7 @@ namespace metastable::analysis {
 
 /// Fits terms to the same runs under a tolerant model, whose sensors err three times as much and of which no row is
 /// wild. Where an effect moves most rows far off, the likelihood of the model itself rises nearly nowhere towards it:
-/// row after row counts as wild.
+/// row after row counts as wild. Where a recalibration alone brings the rows back, it starts from there.
 class TolerantStarts {
  public:
   TolerantStarts(std::shared_ptr<const Machine> machine, MachineRuns runs);
@@ -30,7 +30,8 @@ class TolerantStarts {
   struct Tolerant {
     std::unique_ptr<TransitionModel> model;
     Fit recalibrated;
-    EffectScan scan;  // of all its effects
+    bool for_effects = false;  // Recalibrated it is far off, too; else only the recalibration starts from there.
+    EffectScan scan;           // of all its effects, where it is for them
   };
   std::unique_ptr<Tolerant> tolerant() const;
 

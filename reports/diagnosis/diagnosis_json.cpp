@@ -213,6 +213,7 @@ Json steps_json(const analysis::StepsBeforeFailure& s) {
           {"recalibrated_interval_90", interval_json(s.recalibrated_90)},
           {"with_effect", positive_or_null(s.with_effect)},
           {"with_effect_interval_90", interval_json(s.with_effect_90)},
+          {"later", positive_or_null(s.later)},
           {"machine", machine}};
 }
 

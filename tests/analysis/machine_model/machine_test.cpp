@@ -137,5 +137,17 @@ TEST(MachineBounds, ThatAreReversedAreCalledSo) {
   EXPECT_EQ(refused(), "effects: bend: c: lower is above upper in its bounds [0.5, -0.5]");
 }
 
+TEST(MachineEffects, HaveNamesOfTheirOwn) {
+  Machine machine;
+  machine.states = {"x"};
+  machine.observe = {{"x", 0.1}};
+  machine.step = [](const MachineBatch&) {};
+  const auto refused = [&] { return message_of<std::invalid_argument>([&] { machine.require_valid(); }); };
+  machine.effects = {{"no_gap", {{"c", 0, -0.5, 0.5}}}};
+  EXPECT_EQ(refused(), "effects: \"no_gap\" is a name that answers give to no effect");
+  machine.effects = {{"drag+friction", {{"c", 0, -0.5, 0.5}}}};
+  EXPECT_EQ(refused(), "effects: \"drag+friction\": a name holds no +, which joins several effects");
+}
+
 }  // namespace
 }  // namespace metastable::analysis::test
