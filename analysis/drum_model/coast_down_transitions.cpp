@@ -191,7 +191,9 @@ CoastDownTransitions::CoastDownTransitions(const Experiment& experiment) : state
 }
 
 // Counters jitter and garble revolutions, and the loss of a run wanders a little and differs from the next one's (air,
-// temperature): none of it is a cause, so all are refitted with every hypothesis, within what is physical.
+// temperature): none of it is a cause, so all are refitted with every hypothesis, within what is physical. Nobody
+// states how a counter errs or a loss wanders: a guess is no part of the model as given, whose noise may be all that
+// there is.
 void CoastDownTransitions::set_up_nuisances() {
   for (const Event& e : events_) typical_speed_ += e.speed * e.speed / static_cast<double>(events_.size());
   typical_speed_ = std::max(1e-3, std::sqrt(typical_speed_));
@@ -213,6 +215,9 @@ void CoastDownTransitions::set_up_nuisances() {
   set(Slot::log_wander_sd,
       {"log wander_sd", std::log(0.1 * noise), 4, 1e-2, -20, std::log(largest_wander * typical_loss_)});
   set(Slot::log_wander_revolutions, {"log wander_revolutions", std::log(20), 1, 1e-2, std::log(2), std::log(500)});
+  for (const std::size_t slot : {Slot::log_tick_jitter_s, Slot::log_tick_jitter_rad, Slot::logit_glitch_share,
+                                 Slot::log_wander_sd, Slot::log_wander_revolutions})
+    nuisances_[slot].assumed = true;
   // The terms of the loss differ from run to run by shares of the mean nominal loss.
   const double run_to_run = std::max(least_run_to_run, stated_.run_to_run.value_or(usual_run_to_run));
   const auto term = [&](const char* name, double scale) {

@@ -25,6 +25,17 @@ constexpr double turn = 2 * std::numbers::pi;
 // feet slide. Units differ by more.
 constexpr double least_time_share = 0.15, most_time_share = 1.5, least_step_share = 0.4, most_step_share = 2.5;
 constexpr double ramp_room = 1.02;  // a ramp is measured to two per cent
+
+// A wheel that turns about its foot has the energy J omega^2 / 2, J = I + M L^2 of that foot. A collision adds none, so
+// that it keeps at most the square root of the two J's ratio of the speed, which is never more than the longest leg
+// over the shortest. Where feet bounce, the hub's own motion may turn into spin: in 20,000 collisions of the virtual
+// laboratory and of wheels under the laws, 1.1 times the speed up to a mean restitution of 0.6, and 3.6 beyond.
+constexpr double bouncing = 0.6;      // a mean restitution beyond which a wheel hops, and may gain speed
+constexpr double gain_room = 1.05;    // on the ratio of legs: they are measured to some per cent
+constexpr double gain_sds = 4;        // of the errors of speeds, on top of it
+constexpr double least_error = 0.05;  // of a speed that is read from angles [rad/s]
+constexpr double most_exchanged = 4;  // times the speed before: an exchange of columns makes no larger gain
+
 constexpr double chance_of_copy = 1e-6;
 
 struct Unit {
@@ -61,6 +72,47 @@ class Plausible {
  public:
   Plausible(const Experiment& experiment, const std::string& file, const CollisionLines& lines, Defects& defects)
       : experiment_(experiment), file_(file), lines_(lines), defects_(defects) {}
+
+  // Says whether most collisions gain speed, which is reported.
+  bool exchanged() {
+    std::vector<double> kept = kept_shares();
+    if (kept.empty()) return false;
+    const double usual = median(kept), most = most_kept();
+    if (usual <= most) return false;
+    const auto gains = std::ranges::count_if(kept, [&](double share) { return share > most; });
+    defects_.add(
+        file_, {1, 1},
+        fmt::format("omega_plus_rad_s: {} of {} collisions gain speed, half of them by a factor of {:.3g} or "
+                    "more, where a wheel of these legs without a motor keeps at most {:.3g} of it: {}",
+                    gains, kept.size(), usual, most,
+                    usual <= most_exchanged ? "omega_minus_rad_s and omega_plus_rad_s are suspected to be exchanged"
+                                            : "two units are suspected in omega_minus_rad_s and omega_plus_rad_s"));
+    return true;
+  }
+
+  // The errors of speeds are no larger than their scatter about the share that is usually kept, stated or not.
+  void gains() {
+    const std::vector<double> kept = kept_shares();
+    if (kept.empty()) return;
+    const double usual = median(kept), most = most_kept();
+    std::vector<double> off;
+    each([&](std::size_t, std::size_t, const MeasuredCollision& c) {
+      if (c.omega_plus) off.push_back(std::abs(*c.omega_plus - usual * c.omega_minus));
+    });
+    const double error = std::max({least_error, std::numbers::sqrt2 * experiment_.sensor.noise_sd.value_or(0),
+                                   experiment_.sensor.last_digit.value_or(0), median_deviation_to_sd * median(off)});
+    Odd gain;
+    double before = 0, after = 0;
+    each([&](std::size_t t, std::size_t i, const MeasuredCollision& c) {
+      if (!c.omega_plus || *c.omega_plus <= most * c.omega_minus + gain_sds * error) return;
+      gain.add(lines_[t][i], *c.omega_plus);
+      if (gain.line == lines_[t][i]) before = c.omega_minus, after = *c.omega_plus;
+    });
+    if (gain.count == 0) return;
+    report(gain, fmt::format("omega_plus_rad_s: {:.4g} rad/s where omega_minus_rad_s is {:.4g}: a wheel of these legs "
+                             "without a motor keeps at most {:.3g} of its speed, here {:.4g} rad/s with errors",
+                             after, before, most, most * before + gain_sds * error));
+  }
 
   void speeds() {
     Odd fast;
@@ -143,6 +195,19 @@ class Plausible {
       if (i > 0) look(t, i, experiment_.trials[t].collisions[i - 1], c);
     });
   }
+  // Returns the shares of their speed that collisions keep; none of a wheel that hops.
+  std::vector<double> kept_shares() const {
+    std::vector<double> kept;
+    if (experiment_.contact.restitution.mean > bouncing) return kept;
+    each([&](std::size_t, std::size_t, const MeasuredCollision& c) {
+      if (c.omega_plus && c.omega_minus > 0) kept.push_back(*c.omega_plus / c.omega_minus);
+    });
+    return kept;
+  }
+  double most_kept() const {
+    const auto [shortest, longest] = std::ranges::minmax(experiment_.wheel.leg_length);
+    return gain_room * longest / shortest;
+  }
   double typical_speed() const {
     std::vector<double> all;
     each([&](std::size_t, std::size_t, const MeasuredCollision& c) { all.push_back(c.omega_minus); });
@@ -198,7 +263,8 @@ void check_plausible(const Experiment& experiment, const std::string& file, cons
                      Defects& defects) {
   if (experiment.trials.empty() || !defects.empty()) return;
   Plausible plausible(experiment, file, lines, defects);
-  plausible.speeds();
+  if (!plausible.exchanged()) plausible.speeds();
+  if (defects.empty()) plausible.gains();
   if (defects.empty()) plausible.times();
   plausible.positions();
 }

@@ -60,19 +60,34 @@ std::vector<TrialValue> beside_their_condition(const TransitionModel& model, std
   return values;
 }
 
+// A parameter along which trials may lie apart.
+struct Direction {
+  std::string name;
+  Eigen::VectorXd change;   // [events] of the score with the parameter
+  Eigen::VectorXd stretch;  // [events] of the logarithm of the score's slope over the observed speed
+};
+
+// Returns the direction of one parameter. @param score  [events] where the derivatives were taken
+Direction direction(std::string name, const Derivatives& columns, Eigen::Index p, const std::vector<double>& score) {
+  const Eigen::Map<const Eigen::VectorXd> z(score.data(), static_cast<Eigen::Index>(score.size()));
+  return {std::move(name), columns.change.col(p), columns.slope.col(p) + z.cwiseProduct(columns.change.col(p))};
+}
+
 // Returns [trials] what the scores say of a parameter by itself, in the trials whose steps tell of it; nothing where
 // many trials do not, as of what depends on their order, and of what changes the spread of scores. Steps weigh alike:
-// trials far off the model have another information, and few of them must not stand for all.
-// @param change  [events] of the score with the parameter
-std::vector<TrialValue> trial_values(const TransitionModel& model, const Eigen::VectorXd& change,
+// trials far off the model have another information, and few of them must not stand for all. Where the change of a
+// score depends on what was observed, change times score is not 0 in the mean, but what the stretch is: without it,
+// trials that differ by their design alone, as slow stretches of a run do from fast ones, would lie apart.
+std::vector<TrialValue> trial_values(const TransitionModel& model, const Direction& direction,
                                      const std::vector<double>& score) {
   std::vector<double> along(model.trials()), weight(model.trials()), events(model.trials());
   double sum = 0, sizes = 0;
   for (std::size_t e = 0; e < model.events().size(); ++e) {
     const Event& event = model.events()[e];
     if (event.kind == EventKind::launch) continue;
-    const double c = change[static_cast<Eigen::Index>(e)];
-    along[event.trial] += c * score[e];
+    const bool outcome = event.kind == EventKind::rest || event.kind == EventKind::survival;  // which has no speed
+    const double c = direction.change[static_cast<Eigen::Index>(e)];
+    along[event.trial] += c * score[e] - (outcome ? 0 : direction.stretch[static_cast<Eigen::Index>(e)]);
     sum += c * score[e];
     sizes += std::abs(c * score[e]);
     weight[event.trial] += c * c;
@@ -103,20 +118,15 @@ Evaluation without_spreads(const TransitionModel& model, const Fit& chosen) {
   return terms.size() == chosen.terms.size() ? chosen.evaluation : model.evaluate(chosen.nuisance, terms);
 }
 
-// A parameter along which trials may lie apart.
-struct Direction {
-  std::string name;
-  Eigen::VectorXd change;
-};
-
 std::vector<Direction> directions(const TransitionModel& model, const EffectScan& scan, const Fit& recalibrated) {
   std::vector<Direction> all;
-  const Eigen::MatrixXd& held = recalibrated.derivatives.change;
-  for (Eigen::Index p = 0; p < std::min(held.cols(), static_cast<Eigen::Index>(model.nuisances().size())); ++p)
-    all.push_back({model.nuisances()[static_cast<std::size_t>(p)].name, held.col(p)});
+  const Derivatives& held = recalibrated.derivatives;
+  const std::vector<double>& score = recalibrated.evaluation.score;
+  for (Eigen::Index p = 0; p < std::min(held.change.cols(), static_cast<Eigen::Index>(model.nuisances().size())); ++p)
+    all.push_back(direction(model.nuisances()[static_cast<std::size_t>(p)].name, held, p, score));
   for (const ScannedEffect& effect : scan.effects)
     for (Eigen::Index p = 0; p < effect.columns.change.cols(); ++p)
-      if (!is_spread(effect.candidate->id)) all.push_back({effect.candidate->id, effect.columns.change.col(p)});
+      if (!is_spread(effect.candidate->id)) all.push_back(direction(effect.candidate->id, effect.columns, p, score));
   return all;
 }
 
@@ -230,7 +240,7 @@ std::optional<TrialGroups> trial_groups(const TransitionModel& model, const Effe
     const Direction* along = nullptr;
     TwoGroups most;
     for (const Direction& one : all) {
-      std::vector<TrialValue> values = trial_values(model, one.change, recalibrated.evaluation.score);
+      std::vector<TrialValue> values = trial_values(model, one, recalibrated.evaluation.score);
       std::optional<TwoGroups> groups = in_order ? broken(values) : split(std::move(values));
       if (!groups || (along && groups->gain <= most.gain)) continue;
       along = &one;
@@ -241,8 +251,7 @@ std::optional<TrialGroups> trial_groups(const TransitionModel& model, const Effe
     if (!(p * static_cast<double>(all.size()) < Rules::two_machines_level / 2)) continue;
     if (&chosen != &recalibrated) {
       GroupSums left;
-      for (const TrialValue& one : trial_values(model, along->change, without_spreads(model, chosen).score))
-        left.add(one);
+      for (const TrialValue& one : trial_values(model, *along, without_spreads(model, chosen).score)) left.add(one);
       if (left.weight > 0 && most.within > Rules::most_left_by_groups * left.squares()) continue;
     }
     return TrialGroups{along->name, std::move(most), in_order};

@@ -1,8 +1,11 @@
 #pragma once
 // A filter follows the speed of one trial through its noisy measurements.
 
+#include <array>
+#include <memory>
 #include <optional>
 #include <utility>
+#include <vector>
 
 #include "analysis/experiment/experiment.h"
 #include "analysis/wheel_model/memory_of_scores.h"
@@ -17,8 +20,24 @@ inline constexpr double least_log_density = -60;
 /// Returns the normal score of a probability, held inside +-8.
 double score_of_probability(double below);
 
+/// Holds contacts that stand for all of a distribution, each with its weight by Gauss and Hermite's rule in both
+/// scores.
+struct ContactNodes {
+  struct Node {
+    dynamics::Contact contact;
+    double weight;
+  };
+  std::vector<Node> all;
+  std::array<dynamics::Contact, 4> aside;  ///< restitution an sd below and above its median, then friction so
+  double widest = 0;                       ///< sd of the two
+};
+
+/// @param contact  of sds > 0
+ContactNodes contact_nodes(const dynamics::ContactSpread& contact);
+
 /// Holds the wheel's speed given all measurements so far as N(mean, variance): just before each collision, just after
-/// it where that is measured. This is exact while the sensor noise is small beside the spread of a collision. Each
+/// it where that is measured. A collision that spreads speeds widely beside the sensor noise is summed over that noise,
+/// one that spreads them less is summed over its contacts, and between the two sums one gives way to the other. Each
 /// trial needs a filter of its own.
 class SpeedFilter {
  public:
@@ -40,8 +59,10 @@ class SpeedFilter {
   /// @param law_error  sd of the law errors that reported speeds are given [rad/s]; `settled` only
   /// @param slide_error  sd of what the law does not know of a slide [m]; `settled` only
   /// @param memory  of scores that the extension's memory of contacts is
+  /// @param contacts  of the wheel; nothing: collisions are taken to spread speeds widely beside the noise
   SpeedFilter(const dynamics::Extension& extension, const ScoreTilt& tilt, double noise, double slack = 0,
-              double law_error = 0, double slide_error = 1e-3, const MemoryOfScores& memory = {});
+              double law_error = 0, double slide_error = 1e-3, const MemoryOfScores& memory = {},
+              std::shared_ptr<const ContactNodes> contacts = {});
 
   /// The first speed is seen: it is held against the stated launch.
   Out launch(const Condition& condition, double reported);
@@ -68,8 +89,20 @@ class SpeedFilter {
   Out transition(const dynamics::ExtendedWheel& wheel, const dynamics::StepContext& context, double plus, double rate,
                  double blur);
   Out weighed(double density, double below, double rate);
+  // Holds what a speed after a collision that spreads speeds little says.
+  struct Narrow {
+    double share = 0;     // that this sum has beside the one over the noise, in [0, 1]
+    double variance = 0;  // of omega+ by its contacts alone
+    double density = 0, below = 0;
+    double mean = 0, left = 0;  // of the belief of omega+ after it was seen: mean and variance
+  };
+  Narrow narrowness(const dynamics::ExtendedWheel& wheel, const dynamics::StepContext& context, double blur) const;
+  template <class Visit>
+  void visit_contacts(const dynamics::ExtendedWheel& wheel, const dynamics::StepContext& context, Visit visit) const;
+  void sum_over_contacts(const dynamics::ExtendedWheel& wheel, const dynamics::StepContext& context, double plus,
+                         double rate, Narrow& narrow) const;
   Out settled_step(const dynamics::ExtendedWheel& wheel, const dynamics::StepContext& context, const Touch& touch);
-  void update(const dynamics::ExtendedWheel& wheel, const Out& out, double seen);
+  void update(const dynamics::ExtendedWheel& wheel, const Out& out, double seen, double plus, double rate);
 
   const dynamics::Extension& extension_;
   const ScoreTilt& tilt_;
@@ -78,6 +111,9 @@ class SpeedFilter {
   double memory_;  // of contacts
   double told_;    // share of it that a score tells
   bool blurred_;
+  std::shared_ptr<const ContactNodes> contacts_;
+  Narrow narrow_;     // of the last transition
+  double shown_ = 1;  // share of the last score's variance that its contact has beside the noise
   double mean_ = 0, variance_ = 0;
   double recalled_ = 0, doubt_ = 1;  // mean and variance of what contacts remember, after the last score
   // Tells, under `settled`, the speed before the collision whose omega+ the mean now is; nothing: it is that speed's.

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <memory>
 #include <stdexcept>
 
 #include "dynamics/numerics/truncated_normal.h"
@@ -16,6 +17,8 @@ using dynamics::StepContext;
 // narrow beside the prior: trapezoids of this width in its sds are right to 1e-3 of a likelihood. The others are in sds
 // of the prior.
 constexpr double wide_posterior = 0.5, width = 1.6, widest = 0.8, narrowest = 0.05, farthest = 4.2;
+// Noise of a speed [rad/s] hides a friction at least this times as large.
+constexpr double told_by_noise = 0.2;
 constexpr double negligible = 8;  // log weight below the largest: four of the posterior's sds away
 
 std::size_t collision_of(const Event& event) { return static_cast<std::size_t>(event.number) - 1; }
@@ -57,11 +60,13 @@ TrialFollower::TrialFollower(const WheelRuns& measured, const WheelRun& run, con
       hypothesis_(hypothesis),
       day_shift_(hypothesis.shift_of(run.condition)),
       friction_sd_(hypothesis.extension.contact.trial_friction_sd),
-      nodes_(nodes_for(friction_sd_ * std::sqrt(static_cast<double>(run.collisions.size())) /
-                       hypothesis.contact.friction_sd)),
+      nodes_(nodes_for(
+          friction_sd_ * std::sqrt(static_cast<double>(run.collisions.size())) /
+          std::max(hypothesis.contact.friction_sd, told_by_noise * hypothesis.noise.value_or(measured.noise)))),
       filters_(nodes_.size(),
                SpeedFilter(hypothesis.extension, hypothesis.tilt, hypothesis.noise.value_or(measured.noise),
-                           measured.slack, measured.law_error, measured.slide_error, measured.memory)) {
+                           measured.slack, measured.law_error, measured.slide_error, measured.memory,
+                           std::make_shared<const ContactNodes>(contact_nodes(hypothesis.contact)))) {
   for (const ScoreNode& node : nodes_) log_weight_.push_back(std::log(node.weight));
 }
 

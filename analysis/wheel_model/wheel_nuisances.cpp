@@ -10,20 +10,46 @@ namespace {
 // It lets a fit leave them behind at a cost of 4.6 in log likelihood, and no effect gains more by bringing them back.
 constexpr double misstated_contact = 0.01;
 
+// Contacts that are stated to scatter by this or more are not fitted as scattering by less than half of it; the others
+// are, down to what the noise hides.
+constexpr double least_scatter = 0.01;
+// An sd of the contact so many times the noise [rad/s] changes the variance of a noisy speed by less than half a per
+// cent.
+constexpr double hidden_by_noise = 0.01;
+constexpr double smallest_sd = 1e-6;  // with which densities are still told
+
+// Returns the least sd that a contact is told to have where its stated one is small.
+double least_sd(const NominalContact& nominal, std::optional<double> noise) {
+  if (nominal.law == dynamics::Law::settled || !noise) return least_scatter;
+  return std::clamp(hidden_by_noise * *noise, smallest_sd, least_scatter);
+}
+
+Nuisance sd_nuisance(const char* name, double stated, double least, double upper) {
+  const double start = std::max(least, stated), usual = least_scatter / 2,
+               lower = stated < least_scatter ? std::min(usual, least) : usual;
+  return {name, std::log(start), 0.4, 1e-3, std::log(lower), std::log(upper)};
+}
+
 }  // namespace
 
-std::vector<Nuisance> wheel_nuisances(const NominalContact& nominal, std::optional<double> noise) {
+dynamics::ContactSpread stated_contact(const NominalContact& nominal, double noise) {
+  const Spread &eta = nominal.restitution, &mu = nominal.friction;
+  const double least = least_sd(nominal, noise);
+  return {eta.mean, std::max(least, eta.sd), mu.mean, std::max(least, mu.sd)};
+}
+
+std::vector<Nuisance> wheel_nuisances(const NominalContact& nominal, std::optional<double> noise,
+                                      std::optional<double> seen) {
   const Spread &eta = nominal.restitution, &mu = nominal.friction;
   using Slot = WheelSlot;
   const bool settled = nominal.law == dynamics::Law::settled;
   const std::size_t at_noise = settled ? Slot::log_settled_noise_sd : Slot::log_noise_sd;
+  const double least = least_sd(nominal, seen);
   std::vector<Nuisance> all(noise ? at_noise + 1 : at_noise);
   all[Slot::restitution_mean] = {"restitution_mean", eta.mean, 0.08, 1e-4, 0.02, 0.98};
-  all[Slot::log_restitution_sd] = {"log restitution_sd", std::log(std::max(0.01, eta.sd)), 0.4, 1e-3, std::log(0.005),
-                                   std::log(0.4)};
+  all[Slot::log_restitution_sd] = sd_nuisance("log restitution_sd", eta.sd, least, 0.4);
   all[Slot::friction_mean] = {"friction_mean", mu.mean, 0.08, 1e-4, 0.02, 1.5};
-  all[Slot::log_friction_sd] = {"log friction_sd", std::log(std::max(0.01, mu.sd)), 0.4, 1e-3, std::log(0.005),
-                                std::log(0.5)};
+  all[Slot::log_friction_sd] = sd_nuisance("log friction_sd", mu.sd, least, 0.5);
   for (const std::size_t stated :
        {Slot::restitution_mean, Slot::log_restitution_sd, Slot::friction_mean, Slot::log_friction_sd})
     all[stated].misstated = misstated_contact;

@@ -34,8 +34,14 @@ struct WheelSlot {
   };
 };
 
+/// Returns the contact as it is stated, with sds that are not 0: one stated to be constant scatters by so little that
+/// the noise hides it. @param noise  sd of reported speeds [rad/s]
+dynamics::ContactSpread stated_contact(const NominalContact& nominal, double noise);
+
 /// @param noise  sd of reported speeds to start from, where it is refitted [rad/s]
-std::vector<Nuisance> wheel_nuisances(const NominalContact& nominal, std::optional<double> noise);
+/// @param seen  sd of reported speeds, refitted or not [rad/s]; where it is not known every contact scatters by 0.01
+std::vector<Nuisance> wheel_nuisances(const NominalContact& nominal, std::optional<double> noise,
+                                      std::optional<double> seen = {});
 
 /// Says what these values of the nuisances suppose of the wheel, without effects.
 WheelHypothesis hypothesis_at(std::span<const double> nuisance);

@@ -243,19 +243,27 @@ void blur_digits(WheelRuns& measured, double digits) {
                   added, measured.noise));
 }
 
-// Under `plastic` nothing scatters but what is seen: where that repeats the model to rounding, the normal error of a
-// good sensor is added, against which the model's collisions can be held.
+// Where contacts are stated to be constant, as under `plastic`, nothing scatters but what is seen: where that is exact
+// to rounding, the normal error of a good sensor is added, against which the model's collisions can be held.
 void blur_exact(WheelRuns& measured) {
   constexpr double added = imagined_noise;
   add_normal_errors(measured, added);
+  if (measured.exact_stances) measured.notes.pop_back();
+  measured.notes.push_back(fmt::format("{}: a normal error of {:.2g} rad/s is added to every speed",
+                                       measured.exact_stances
+                                           ? "collisions and stances repeat the model to rounding, as simulated ones do"
+                                           : "contacts are stated to be constant, and speeds are exact to rounding",
+                                       added));
   measured.noise = added;
   measured.noise_stated = true;
   measured.exact_stances = false;
-  measured.notes.back() = fmt::format(
-      "collisions and stances repeat the model to rounding, as simulated ones do: a normal error of {:.2g} rad/s is "
-      "added "
-      "to every speed",
-      added);
+}
+
+// Says whether nothing scatters but what is seen, and that by rounding alone.
+bool repeats_the_model(const WheelRuns& measured) {
+  constexpr double most = 3 * finest_noise;
+  if (measured.law == dynamics::Law::plastic) return measured.exact_stances;
+  return measured.contact.restitution_sd == 0 && measured.contact.friction_sd == 0 && measured.noise < most;
 }
 
 // A stated noise is that of the sensor, the digits' comes to it, and a stated 0 means as good as the digits. Where
@@ -484,7 +492,7 @@ WheelRuns wheel_runs(const Experiment& experiment) {
   estimate_noise(measured, experiment.sensor);
   if (measured.law == dynamics::Law::settled)
     prepare_settled(measured, experiment);
-  else if (measured.law == dynamics::Law::plastic && measured.exact_stances)
+  else if (repeats_the_model(measured))
     blur_exact(measured);
   else
     blur_digits(measured, experiment.sensor.last_digit.value_or(0) / std::sqrt(12.0));

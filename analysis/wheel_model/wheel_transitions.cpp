@@ -27,11 +27,8 @@ WheelRuns runs_with_legs(const Experiment& experiment) {
   WheelRuns measured = wheel_runs(experiment);
   if (measured.legs_known || experiment.wheel.equal_legs()) return measured;
   WheelRuns stated = wheel_runs(with_legs_from_the_first(experiment));
-  const NominalContact& c = experiment.contact;
   const WheelHypothesis nominal{
-      .contact = {c.restitution.mean, std::max(0.01, c.restitution.sd), c.friction.mean, std::max(0.01, c.friction.sd)},
-      .tilt = ScoreTilt(0, 0),
-      .extension = {}};
+      .contact = stated_contact(experiment.contact, stated.noise), .tilt = ScoreTilt(0, 0), .extension = {}};
   const double with = wheel_likelihood(stated, wheel_events(stated), nominal).total();
   if (!(with > wheel_likelihood(measured, wheel_events(measured), nominal).total() + clearly)) return measured;
   stated.notes.insert(stated.notes.begin(),
@@ -153,8 +150,8 @@ void WheelTransitions::set_up_parameters() {
   // only assumed.
   const bool settled = measured_.law == dynamics::Law::settled;
   const bool refits_noise = !measured_.noise_stated && measured_.speeds_after != settled && !measured_.exact_stances;
-  nuisances_ =
-      wheel_nuisances(experiment_.contact, refits_noise ? std::optional<double>(measured_.noise) : std::nullopt);
+  nuisances_ = wheel_nuisances(experiment_.contact,
+                               refits_noise ? std::optional<double>(measured_.noise) : std::nullopt, measured_.noise);
   set_up_days();
   WheelDesign design;
   design.legs = measured_.wheel.legs();
@@ -285,27 +282,35 @@ Evaluation WheelTransitions::evaluate_with(std::span<const double> nuisance, std
 }
 
 // A recalibration whose stated contact is far astray starts from a coarse lattice of means, too: there the likelihood
-// is flat, and no step from what is stated finds the way.
+// is flat, and no step from what is stated finds the way. So it is about sds that the noise hides: larger ones are
+// tried.
 std::vector<FitStart> WheelTransitions::starts(std::span<const EffectTerm> terms) const {
-  constexpr double astray = 2;   // mean square of the scores as given, of independent standard normals if it is right
-  constexpr double wide = 0.08;  // sds of either, with which a mean between two of the lattice still shows
+  constexpr double astray = 2;     // mean square of the scores as given, of independent standard normals if it is right
+  constexpr double wide = 0.08;    // sds of either, with which a mean between two of the lattice still shows
+  constexpr double narrow = 0.01;  // a stated sd that noise may hide
   if (!terms.empty()) return {};
   std::vector<double> values = nominal_values(*this);
   const Evaluation given = evaluate(values, {});
   double squares = 0;
   for (const double score : given.score) squares += score * score;
-  if (squares < astray * static_cast<double>(given.score.size())) return {};
   FitStart best;
   double most = given.total();
-  for (const double restitution : {0.1, 0.25, 0.4, 0.55, 0.7, 0.85})
-    for (const double friction : {0.1, 0.2, 0.3, 0.4, 0.55, 0.75, 1.0, 1.3}) {
-      set_contact(values, {restitution, wide, friction, wide});
-      double reached = evaluate(values, {}).total();
-      for (std::size_t p = 0; p < values.size(); ++p) reached -= nuisances_[p].cost(values[p]);
-      if (!(reached > most)) continue;
-      most = reached;
-      best = {values, {}};
-    }
+  const auto offer = [&](const dynamics::ContactSpread& contact) {
+    set_contact(values, contact);
+    double reached = evaluate(values, {}).total();
+    for (std::size_t p = 0; p < values.size(); ++p) reached -= nuisances_[p].cost(values[p]);
+    if (!(reached > most)) return;
+    most = reached;
+    best = {values, {}};
+  };
+  const Spread &eta = experiment_.contact.restitution, &mu = experiment_.contact.friction;
+  if (measured_.law != dynamics::Law::settled && (eta.sd < narrow || mu.sd < narrow))
+    for (const double sd : {0.003, 0.01, 0.03, wide})
+      offer({eta.mean, std::max(sd, eta.sd), mu.mean, std::max(sd, mu.sd)});
+  if (squares >= astray * static_cast<double>(given.score.size()))
+    for (const double restitution : {0.1, 0.25, 0.4, 0.55, 0.7, 0.85})
+      for (const double friction : {0.1, 0.2, 0.3, 0.4, 0.55, 0.75, 1.0, 1.3})
+        offer({restitution, wide, friction, wide});
   if (best.nuisance.empty()) return {};
   return {best};
 }

@@ -3,9 +3,11 @@
 #include <fmt/format.h>
 #include <gtest/gtest.h>
 
+#include <cmath>
 #include <functional>
 #include <numbers>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "analysis/experiment/experiment.h"
@@ -85,6 +87,38 @@ TEST_F(PlausibilityTest, NoticesCopies) {
   twice.insert(twice.end(), trials_.begin(), trials_.end());
   ASSERT_EQ(refused(twice).size(), 1u);
   EXPECT_NE(refused(twice).front().find("so have 9 more trials"), std::string::npos) << refused(twice).front();
+}
+
+TEST_F(PlausibilityTest, SuspectsThatSpeedsBeforeAndAfterAreExchanged) {
+  const std::vector<std::string> lines =
+      refused([](dynamics::TrialCollision& c) { std::swap(c.omega_minus, c.omega_plus); });
+  ASSERT_EQ(lines.size(), 1u);
+  EXPECT_NE(lines.front().find("suspected to be exchanged"), std::string::npos) << lines.front();
+}
+
+TEST_F(PlausibilityTest, NamesTheCollisionThatGainsSpeed) {
+  std::vector<dynamics::Trial> trials = trials_;
+  trials[0].collisions[3].omega_plus = 1.7 * trials[0].collisions[3].omega_minus;
+  const std::vector<std::string> lines = refused(trials);
+  ASSERT_EQ(lines.size(), 1u);
+  EXPECT_NE(lines.front().find("collisions.csv:5:"), std::string::npos) << lines.front();
+  EXPECT_NE(lines.front().find("keeps at most"), std::string::npos) << lines.front();
+  EXPECT_EQ(lines.front().find("exchanged"), std::string::npos) << lines.front();
+}
+
+// A shorter leg turns faster, errors of speeds look like gains, and a wheel that hops gains spin from its hub.
+TEST_F(PlausibilityTest, TakesGainsThatAWheelMayHave) {
+  std::vector<dynamics::Trial> trials = trials_;
+  trials[0].collisions[3].omega_plus = 1.01 * trials[0].collisions[3].omega_minus;
+  EXPECT_TRUE(refused(trials).empty());
+  const auto noisy = [at = 0.0](dynamics::TrialCollision& c) mutable {
+    c.omega_minus += 1.2 * std::sin(at += 1);
+    c.omega_plus += 1.2 * std::sin(1.7 * at);
+  };
+  EXPECT_TRUE(refused(noisy).empty());
+  trials[0].collisions[3].omega_plus = 1.7 * trials[0].collisions[3].omega_minus;
+  setting_.restitution.mean = 0.8;
+  EXPECT_TRUE(refused(trials).empty());
 }
 
 // Trials that chance has no part in are alike, and those of a short list of contacts often.

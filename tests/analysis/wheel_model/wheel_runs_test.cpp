@@ -9,6 +9,7 @@
 #include <random>
 
 #include "analysis/experiment/experiment_folder.h"
+#include "analysis/wheel_model/wheel_columns.h"
 #include "tests/analysis/diagnosed.h"
 #include "tests/analysis/settings.h"
 
@@ -44,6 +45,22 @@ TEST(WheelRuns, DigitsAreNoise) {
     for (const int digits : {2, 3, 4})
       EXPECT_NEAR(printed(0, digits, stated).noise * std::pow(10, digits), std::sqrt(5 / 12.0), 0.04) << digits;
   EXPECT_TRUE(printed(0, 6, 0.0).exact_stances);
+}
+
+// Contacts that do not scatter leave speeds that repeat the model to rounding, against which nothing can be held: the
+// noise of a good sensor is added.
+TEST(WheelRuns, ConstantContactsGetTheNoiseOfAGoodSensor) {
+  Experiment e = printed_experiment(0, 6, 0.0);
+  e.contact.restitution.sd = 0;
+  EXPECT_TRUE(wheel_runs(e).exact_stances);
+  e.contact.friction.sd = 0;
+  const WheelRuns measured = wheel_runs(e);
+  EXPECT_FALSE(measured.exact_stances);
+  EXPECT_DOUBLE_EQ(measured.noise, imagined_noise);
+  EXPECT_NE(measured.runs[0].collisions[0].before, e.trials[0].collisions[0].omega_minus);
+  Experiment noisy = printed_experiment(0.02, 6, 0.02);
+  noisy.contact.restitution.sd = noisy.contact.friction.sd = 0;
+  EXPECT_EQ(wheel_runs(noisy).runs[0].collisions[0].before, noisy.trials[0].collisions[0].omega_minus);
 }
 
 // Errors that are spread evenly have no tails: of the sum of two 0.9 % are beyond 2.2, of normal ones 2.8 %. Trials of

@@ -43,6 +43,39 @@ TEST(WheelSimulation, ScoresOfItsOwnDataAreStandardNormal) {
   }
 }
 
+// Returns the mean product of each event's score and that so many events later in its trial.
+double correlation(const TransitionModel& model, const Evaluation& e, std::size_t lag) {
+  double sum = 0, count = 0;
+  for (std::size_t i = lag; i < e.score.size(); ++i)
+    if (model.events()[i].trial == model.events()[i - lag].trial && is_contact(model.events()[i].kind)) {
+      sum += e.score[i] * e.score[i - lag];
+      count += 1;
+    }
+  return sum / count;
+}
+
+// A belief that takes the noise for what contacts scatter misses it again, with the other sign, at the next speed:
+// wheels with constant contacts were said to remember them.
+TEST(WheelSimulation, ScoresOfContactsBelowTheNoiseAreStandardNormalAndForgetful) {
+  for (const double sd : {0.0, 0.002, 0.004, 0.006, 0.008, 0.012, 0.02})
+    for (const bool speeds_after : {true, false}) {
+      Experiment e = test::wheel_design(240, 16, speeds_after);
+      e.contact.restitution.sd = e.contact.friction.sd = sd;
+      e.sensor.noise_sd = 0.02;
+      const auto design = wheel_transitions(e);
+      const auto data = design->simulate(nominal_values(*design), {}, 5);
+      const Evaluation seen = data->evaluate(nominal_values(*data), {});
+      for (const EventKind kind : {speeds_after ? EventKind::collision : EventKind::step, EventKind::stance}) {
+        if (kind == EventKind::stance && !speeds_after) continue;
+        const Moments m = moments(*data, seen, kind);
+        EXPECT_NEAR(m.mean, 0, 4 / std::sqrt(m.count)) << sd << ' ' << speeds_after;
+        EXPECT_NEAR(m.square, 1, 4 * std::sqrt(2 / m.count)) << sd << ' ' << speeds_after;
+        for (const std::size_t lag : {std::size_t{1}, std::size_t{2}})
+          EXPECT_NEAR(correlation(*data, seen, lag), 0, 4 / std::sqrt(m.count)) << sd << ' ' << speeds_after;
+      }
+    }
+}
+
 TEST(WheelSimulation, SameSeedSameData) {
   const auto design = wheel_transitions(test::wheel_design(6, 5));
   const auto a = design->simulate(nominal_values(*design), {}, 9), b = design->simulate(nominal_values(*design), {}, 9),

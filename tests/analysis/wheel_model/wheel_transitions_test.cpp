@@ -7,6 +7,7 @@
 #include <array>
 #include <cmath>
 #include <cstdint>
+#include <limits>
 #include <optional>
 #include <utility>
 
@@ -47,6 +48,27 @@ TEST(WheelTransitions, FitsFindTheSizesOfEffects) {
       EXPECT_NEAR(found.terms[0].values[p], one.values[p], 4 * std::sqrt(covariance(at, at))) << one.id << ' ' << p;
     }
     EXPECT_GT(found.penalised, fit(*data, nominal_values(*data), {}).penalised + 8) << one.id;
+  }
+}
+
+// Constant contacts leave speeds that scatter by the noise alone, and a recalibration finds nothing else. Where they
+// scatter all the same, it finds by how much.
+TEST(WheelTransitions, OfConstantContactsTakeTheNoiseForWhatItIs) {
+  Experiment constant = test::wheel_design(40, 16);
+  constant.contact.restitution.sd = constant.contact.friction.sd = 0;
+  constant.sensor.noise_sd = 0.02;
+  const auto design = wheel_transitions(constant);
+  for (const double sd : {0.0, 0.03}) {
+    std::vector<double> truth = nominal_values(*design);
+    if (sd > 0) truth[1] = truth[3] = std::log(sd);  // of restitution, of friction
+    const auto data = design->simulate(truth, {}, 3);
+    const Fit found = best_fit(*data, nominal_values(*data), {});
+    EXPECT_TRUE(found.converged) << found.reason;
+    const double friction_sd = std::exp(found.nuisance[3]);
+    EXPECT_GT(friction_sd, sd / 1.3);
+    EXPECT_LT(friction_sd, sd > 0 ? 1.3 * sd : 0.002);
+    const double gained = found.log_likelihood - data->evaluate(nominal_values(*data), {}).total();
+    EXPECT_LT(gained, sd > 0 ? std::numeric_limits<double>::infinity() : 8);
   }
 }
 

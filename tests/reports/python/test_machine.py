@@ -256,7 +256,8 @@ class Refused(unittest.TestCase):
 
     def test_other_units_are_suspected_aloud(self):
         machine, data = pendulum(), swung(trials=10)
-        answer = metastable.diagnose(metastable.runs(machine, trial=data["trial"], swing_rad=np.degrees(data["swing_rad"])), machine)
+        runs = metastable.runs(machine, trial=data["trial"], swing_rad=np.degrees(data["swing_rad"]))
+        answer = metastable.diagnose(runs, machine, catalogue="dry_friction")
         self.assertIn("is it in degrees where the machine has radians?", " ".join(answer.notes))
 
     def test_some_trials_in_another_unit_are_suspected_aloud(self):
