@@ -92,7 +92,10 @@ const Variation* same_variation(const TransitionModel& model, const RankedCause&
   if (!place) return nullptr;
   const Variation& one = model.variations()[*place];
   const bool named = std::ranges::find(one.named, best.terms.front().candidate->id) != one.named.end();
-  return named && said->quadratic < best.gain + rules.told_apart ? &one : nullptr;
+  const double most = std::ranges::max_element(alone, {}, &LeftInFacet::evidence)->evidence;
+  const bool as_much =
+      std::abs(said->quadratic - best.gain) < rules.told_apart && most < said->evidence + 0.5 * rules.told_apart;
+  return named && as_much ? &one : nullptr;
 }
 
 std::optional<InPlace> in_place_of_effects(const TransitionModel& model, const CauseRanking& ranking,

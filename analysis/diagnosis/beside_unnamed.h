@@ -27,7 +27,8 @@ struct InPlace {
 std::optional<InPlace> varies_without_name(const TransitionModel& model, const std::vector<LeftInFacet>& alone);
 
 /// Returns the variation that says most of all that may act alone, where it is what the hypothesis names: that is one
-/// effect of Variation::named, and gains as much up to Rules::told_apart. Else nullptr.
+/// effect of Variation::named and gains as much, up to Rules::told_apart, and no facet of the map says clearly more.
+/// Else nullptr.
 const Variation* same_variation(const TransitionModel& model, const RankedCause& best,
                                 const std::vector<LeftInFacet>& alone, const Rules& rules);
 

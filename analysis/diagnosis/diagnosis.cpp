@@ -505,7 +505,7 @@ Diagnosis answer(const TransitionModel& model, const Fitted& fitted, Decided dec
                                       : even_push_in_words(model, fitted.recalibrated, *best, d.rules, options.threads);
   progress(0.88, "steps before failure");
   d.shrinkage.steps = steps_before_failure(model, fitted.given.nuisance, fitted.recalibrated, cause, options.seed);
-  d.shrinkage.steps.later = later_steps(model, cause);
+  set_later_steps(d.shrinkage.steps, model, cause);
   if (const auto [at_risk, rests] = model.rests(); at_risk > 0 && !d.shrinkage.measures.empty())
     d.shrinkage.measures.push_back(rest_shrinkage(
         at_risk, rests, d.shrinkage.steps,
@@ -573,7 +573,8 @@ Diagnosis diagnose(const TransitionModel& model, const DiagnosisOptions& options
   // Where something has no name, an effect may have been missed whose likely size no slope leads to.
   if (decided.d.verdict == Verdict::unexplained || decided.d.verdict == Verdict::partly_explained) {
     const std::vector<Candidate> far =
-        with_far_sizes(model, fitted.recalibrated, candidates, fitted.ranking.singles, options.threads);
+        with_far_sizes(model, fitted.recalibrated, candidates, fitted.ranking.singles, options.rules, options.threads,
+                       [&] { progress(0.86, "what may lie far from none"); });
     if (!far.empty()) {
       std::vector<const Candidate*> again;
       for (const Candidate& candidate : far) again.push_back(&candidate);

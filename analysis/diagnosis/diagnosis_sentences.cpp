@@ -270,9 +270,8 @@ void say_what_closes(std::vector<std::string>& s, const Diagnosis& d) {
 // as long as the measured ones.
 void say_later_steps(std::vector<std::string>& s, const Diagnosis& d) {
   const StepsBeforeFailure& steps = d.shrinkage.steps;
-  if (steps.machine.empty() || steps.machine.front().at_least || !(steps.later > 0)) return;
-  const double ratio = steps.later / steps.machine.front().steps.value;
-  if (ratio < d.rules.later_apart && ratio > 1 / d.rules.later_apart) return;
+  if (!(steps.later_times > 0)) return;
+  if (steps.later_times < d.rules.later_apart && steps.later_times > 1 / d.rules.later_apart) return;
   s.push_back(
       fmt::format("That is for trials as long as these: in the later half of their {0}s {1}, so that trials without an "
                   "end take {2} "
@@ -281,7 +280,7 @@ void say_later_steps(std::vector<std::string>& s, const Diagnosis& d) {
                   std::isfinite(steps.later)
                       ? fmt::format("the model fails once in {}", format_number(steps.later, NumberFormat::general, 2))
                       : "the model does not fail",
-                  ratio > 1 ? "more" : "fewer"));
+                  steps.later_times > 1 ? "more" : "fewer"));
 }
 
 // Says the expected steps of the machine itself, as measured and where they were asked.
@@ -301,8 +300,8 @@ void say_machine_steps(std::vector<std::string>& s, const Diagnosis& d) {
     const DecimalEstimate steps = to_decimal(machine.steps, NumberFormat::general, 3);
     s.push_back(fmt::format("This machine takes {} {}s before failure{} (90 %: {} to {}).", plain_text(steps.value),
                             d.data.step_name, where, plain_text(steps.lower), plain_text(steps.upper)));
+    if (machine.where.empty()) say_later_steps(s, d);
   }
-  say_later_steps(s, d);
 }
 
 void say_what_is_hidden(std::vector<std::string>& s, const Diagnosis& d) {

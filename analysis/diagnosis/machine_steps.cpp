@@ -9,6 +9,7 @@
 #include <stdexcept>
 
 #include "analysis/statistics/interval_95.h"
+#include "analysis/statistics/median.h"
 #include "analysis/statistics/random.h"
 #include "markov/dense_matrix.h"
 #include "markov/parallel.h"
@@ -18,7 +19,8 @@ namespace {
 
 // Draws of what stands for the machine, and of the recalibrated model: fewer save time.
 constexpr int draws_of_machine = 16, draws_of_recalibrated = 10;
-constexpr double of_no_say = 3;  // sd of the logarithm
+constexpr double of_no_say = 3;   // sd of the logarithm
+constexpr double few_steps = 20;  // Fewer later steps say nothing of how failures are spread along trials.
 // The grid of a model's error has so many nodes, out to so many sds on either side.
 constexpr int error_nodes = 241;
 constexpr double error_reach = 4;
@@ -239,17 +241,23 @@ MachineSteps survivors_steps(const std::string& where, double model_lower, const
   return {where, {infinite, std::max({1.0, seen, known}), infinite}, true};
 }
 
-double later_steps(const TransitionModel& model, const Fit& fit) {
+void set_later_steps(StepsBeforeFailure& steps, const TransitionModel& model, const Fit& fit) {
   const std::vector<Event>& events = model.events();
   const std::vector<double> chances = model.rest_chances(fit.nuisance, fit.terms);
-  int last = 0;
+  std::vector<double> numbers;
   for (const Event& event : events)
-    if (event.rested) last = std::max(last, event.number);
-  double at_risk = 0, failures = 0;
-  for (std::size_t e = 0; e < events.size(); ++e)
-    if (events[e].rested && 2 * events[e].number > last) ++at_risk, failures += chances[e];
-  if (!(at_risk > 0) || last < 2) return 0;
-  return failures > 0 ? at_risk / failures : infinite;
+    if (event.rested) numbers.push_back(event.number);
+  if (numbers.empty()) return;
+  const double half = median(numbers);
+  double all = 0, later = 0, failures = 0, later_failures = 0;
+  for (std::size_t e = 0; e < events.size(); ++e) {
+    if (!events[e].rested) continue;
+    ++all, failures += chances[e];
+    if (events[e].number > half) ++later, later_failures += chances[e];
+  }
+  if (later < few_steps || !(failures > 0)) return;
+  steps.later = later_failures > 0 ? later / later_failures : infinite;
+  steps.later_times = steps.later * failures / all;
 }
 
 void add_machine_steps(Diagnosis& d, const TransitionModel& model, const WeighedFit& recalibrated,

@@ -70,9 +70,9 @@ Estimate bounded_by_count(const Estimate& joined, const StepsBeforeFailure& coun
 MachineSteps survivors_steps(const std::string& where, double model_lower, const StepsBeforeFailure& counted,
                              bool explained);
 
-/// Returns StepsBeforeFailure::later under a fit: infinity where no failure is to be expected in the later half, 0
-/// where outcomes are not known or all steps are of one number.
-double later_steps(const TransitionModel& model, const Fit& fit);
+/// Fills in StepsBeforeFailure::later and ::later_times under a fit, infinity where no failure is to be expected in the
+/// later half. They stay 0 where outcomes are not known, and where too few steps are later ones.
+void set_later_steps(StepsBeforeFailure& steps, const TransitionModel& model, const Fit& fit);
 
 /// Fills in the intervals of the models' expected steps, and the machine's own; none where neither the models nor the
 /// count bound them.

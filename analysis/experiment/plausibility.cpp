@@ -31,7 +31,7 @@ constexpr double ramp_room = 1.02;  // a ramp is measured to two per cent
 // over the shortest. Where feet bounce, the hub's own motion may turn into spin: in 20,000 collisions of the virtual
 // laboratory and of wheels under the laws, 1.1 times the speed up to a mean restitution of 0.6, and 3.6 beyond.
 constexpr double bouncing = 0.6;      // a mean restitution beyond which a wheel hops, and may gain speed
-constexpr double gain_room = 1.05;    // on the ratio of legs: they are measured to some per cent
+constexpr double gain_room = 1.1;     // on the ratio of legs: what bouncing feet add
 constexpr double gain_sds = 4;        // of the errors of speeds, on top of it
 constexpr double least_error = 0.05;  // of a speed that is read from angles [rad/s]
 constexpr double most_exchanged = 4;  // times the speed before: an exchange of columns makes no larger gain

@@ -14,11 +14,11 @@ namespace metastable::analysis {
 /// Holds the line of each collision in its file, by trial.
 using CollisionLines = std::vector<std::vector<std::size_t>>;
 
-/// Reports collisions that leave more speed than they found, beyond what legs of unequal lengths and errors of speeds
-/// can do: with the suspicion that the two columns are exchanged where most do. Else reports speeds no wheel of these
-/// legs rolls at (rolling_speeds()); times in which it would turn by far more or far less than a leg angle from
-/// collision to collision at its speeds; steps of positions far from the distance between its feet, and positions
-/// beyond the ramp's end. One line each, with the first place and the unit that is suspected.
+/// Reports a folder in which most collisions leave more speed than they found, with the suspicion that two columns are
+/// exchanged or in two units; speeds no wheel of these legs rolls at (rolling_speeds()); single collisions that gain
+/// more than legs of unequal lengths and errors of speeds can do; times in which a wheel would turn by far more or far
+/// less than a leg angle from collision to collision at its speeds; steps of positions far from the distance between
+/// its feet, and positions beyond the ramp's end. One line each, with the first place and the unit that is suspected.
 /// @param experiment  of a rimless wheel, trials as they stand in the file
 void check_plausible(const Experiment& experiment, const std::string& file, const CollisionLines& lines,
                      Defects& defects);

@@ -26,15 +26,19 @@ constexpr int stairs_to_a_side = 40;
 
 class FarSearch {
  public:
-  FarSearch(const TransitionModel& model, const Candidate& candidate, int threads)
-      : model_(model), candidate_(candidate), threads_(threads) {}
+  FarSearch(const TransitionModel& model, const Candidate& candidate, int threads,
+            const std::function<void()>& heartbeat)
+      : model_(model), candidate_(candidate), threads_(threads), heartbeat_(heartbeat) {}
 
-  // Returns the log likelihood of the data with each of these sizes. Sizes beyond the bounds are set to these.
+  // Returns the log likelihood of the data with each of these sizes, which rise. Of those beyond a bound the bound
+  // itself is left.
   std::vector<double> likely_with(const std::vector<double>& nuisance, std::vector<double>& sizes) const {
+    if (heartbeat_) heartbeat_();
     const FreeParameter& p = candidate_.parameters[0];
+    for (double& size : sizes) size = std::clamp(size, p.lower, p.upper);
+    sizes.erase(std::unique(sizes.begin(), sizes.end()), sizes.end());
     std::vector<double> likely(sizes.size());
     model_.side_by_side(sizes.size(), threads_, [&](std::size_t i) {
-      sizes[i] = std::clamp(sizes[i], p.lower, p.upper);
       const EffectTerm term{&candidate_, candidate_.variants.front(), {sizes[i]}};
       likely[i] = model_.evaluate(nuisance, {&term, 1}).total();
     });
@@ -48,6 +52,7 @@ class FarSearch {
     for (const double share : far_shares)
       for (const double end : {p.lower, p.upper})
         if (end != p.neutral) sizes.push_back(p.neutral + share * (end - p.neutral));
+    std::ranges::sort(sizes);
     const std::vector<double> likely = likely_with(nuisance, sizes);
     const auto best = std::ranges::max_element(likely);
     return {sizes[static_cast<std::size_t>(best - likely.begin())], *best};
@@ -79,13 +84,14 @@ class FarSearch {
           roughness = std::max(roughness, std::abs(likely[i] - 3 * likely[i - 1] + 3 * likely[i - 2] - likely[i - 3]));
       }
     }
-    p.likely = best;
+    const auto set_likely = [&] { p.likely = best != 0 ? best : p.step; };  // 0 says that there is none.
+    set_likely();
     if (roughness < rough_stairs) return most;
     const auto [sizes, likely] = about(stairs_reach * std::abs(best - p.neutral), stairs_to_a_side);
-    p.likely = best;
+    set_likely();
     for (std::size_t i = 0; i < sizes.size(); ++i)
       if (likely[i] > most - stairs_fall) p.blur = std::max(p.blur, std::abs(sizes[i] - best));
-    p.blur += sizes[1] - sizes[0];
+    if (sizes.size() > 1) p.blur += sizes[1] - sizes[0];
     return most;
   }
 
@@ -93,14 +99,16 @@ class FarSearch {
   const TransitionModel& model_;
   const Candidate& candidate_;
   int threads_;
+  const std::function<void()>& heartbeat_;
 };
 
 }  // namespace
 
 std::vector<Candidate> with_far_sizes(const TransitionModel& model, const Fit& recalibrated,
                                       const std::vector<const Candidate*>& candidates,
-                                      const std::vector<RankedCause>& singles, int threads) {
-  constexpr double told_apart = Rules{}.told_apart / 2;  // in log likelihood
+                                      const std::vector<RankedCause>& singles, const Rules& rules, int threads,
+                                      const std::function<void()>& heartbeat) {
+  const double told_apart = rules.told_apart / 2;  // in log likelihood
   struct FarSize {
     std::size_t candidate;
     double size, likely;
@@ -108,7 +116,7 @@ std::vector<Candidate> with_far_sizes(const TransitionModel& model, const Fit& r
   std::vector<FarSize> far;
   for (std::size_t i = 0; i < candidates.size(); ++i) {
     if (!candidates[i]->seek_far) continue;
-    const auto [size, likely] = FarSearch(model, *candidates[i], threads).likeliest(recalibrated.nuisance);
+    const auto [size, likely] = FarSearch(model, *candidates[i], threads, heartbeat).likeliest(recalibrated.nuisance);
     if (likely > recalibrated.log_likelihood + told_apart) far.push_back({i, size, likely});
   }
   std::ranges::stable_sort(far, std::ranges::greater{}, &FarSize::likely);
@@ -116,7 +124,7 @@ std::vector<Candidate> with_far_sizes(const TransitionModel& model, const Fit& r
   std::vector<Candidate> all;
   for (const auto& [i, size, likely] : far) {
     FreeParameter p = candidates[i]->parameters[0];
-    const double refined = FarSearch(model, *candidates[i], threads).refine(p, size, recalibrated.nuisance);
+    const double refined = FarSearch(model, *candidates[i], threads, heartbeat).refine(p, size, recalibrated.nuisance);
     const double reached = singles[i].fitted() ? singles[i].fit.log_likelihood : recalibrated.log_likelihood;
     if (refined < std::max(reached, recalibrated.log_likelihood) + told_apart) continue;
     if (all.empty())

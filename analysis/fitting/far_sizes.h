@@ -1,6 +1,7 @@
 #pragma once
 // Finds effects whose likely size lies where the slope of the likelihood at none does not lead.
 
+#include <functional>
 #include <vector>
 
 namespace metastable::analysis {
@@ -8,15 +9,18 @@ namespace metastable::analysis {
 struct Candidate;
 struct Fit;
 struct RankedCause;
+struct Rules;
 class TransitionModel;
 
 /// Returns the candidates again, FreeParameter::likely and FreeParameter::blur set where a size far from none makes the
 /// data likelier than the effect's own fit has reached, which starts where the slope at none leads. The list is empty
-/// where there is no such effect. An effect is sought so if Candidate::seek_far says it. Some six likelihoods for each
-/// of them, and some eighty for each of two that these make likeliest.
+/// where there is no such effect. Only effects with Candidate::seek_far are asked. Each of them takes six likelihoods,
+/// and each of two that these make likeliest some 150 more and two fits.
 /// @param singles  fit of each candidate, in their order
+/// @param heartbeat  called before every stage, may throw to stop
 std::vector<Candidate> with_far_sizes(const TransitionModel& model, const Fit& recalibrated,
                                       const std::vector<const Candidate*>& candidates,
-                                      const std::vector<RankedCause>& singles, int threads);
+                                      const std::vector<RankedCause>& singles, const Rules& rules, int threads,
+                                      const std::function<void()>& heartbeat);
 
 }  // namespace metastable::analysis

@@ -100,8 +100,8 @@ struct Rules {
   /// Probability from which on an effect or a facet is listed. Convention: 5 %.
   double least_listed = 0.05;
 
-  /// Factor by which the steps for each failure over the later half of a trial's steps differ from those over the
-  /// whole, for that to be told. Convention: a factor of 2, beyond what intervals of expected steps leave open.
+  /// Factor by which the steps for each failure over the later half of all steps differ from those over whole trials,
+  /// by one model, for that to be told. Convention: a factor of 2, beyond what intervals of expected steps leave open.
   static constexpr double later_apart = 2;
 
   // Validity of chance levels and of causes: what data must have. The benchmark does not turn these.

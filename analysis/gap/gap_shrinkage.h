@@ -40,9 +40,10 @@ struct StepsBeforeFailure {
   /// Intervals of the last two (90 %), which the fitted parameters and the hypotheses' probabilities leave open.
   std::optional<Estimate> recalibrated_90 = {}, with_effect_90 = {};
   std::vector<MachineSteps> machine = {};  ///< as measured; then the place that was asked about
-  /// Steps for each failure over the later half of the measured trials' steps, by the chosen model; 0: not known. All
-  /// other numbers are steps for each failure over whole trials like those measured, however these are cut.
-  double later = 0;
+  /// Steps for each failure over the later half of all measured steps, by their number in their trial and by the chosen
+  /// model, and how many times those over whole trials this is; 0: not known. The numbers above are of whole trials
+  /// that end where the measured ones do.
+  double later = 0, later_times = 0;
   /// Steps of the model that leaves out what has no name, as a multiple of the machine's own (90 %): what ignoring it
   /// costs. The model is the one with the effects at work, or the recalibrated one where none is; no value where
   /// nothing stays or no failure was counted.

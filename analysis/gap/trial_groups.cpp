@@ -64,7 +64,7 @@ std::vector<TrialValue> beside_their_condition(const TransitionModel& model, std
 struct Direction {
   std::string name;
   Eigen::VectorXd change;   // [events] of the score with the parameter
-  Eigen::VectorXd stretch;  // [events] of the logarithm of the score's slope over the observed speed
+  Eigen::VectorXd stretch;  // [events] of log d score / d observed speed with the parameter
 };
 
 // Returns the direction of one parameter. @param score  [events] where the derivatives were taken

@@ -33,7 +33,14 @@ void require_bounds(const std::string& what, double lower, double upper) {
     throw std::invalid_argument(fmt::format("{}: its bounds [{}, {}] leave it no room", what, lower, upper));
 }
 
+// A plus sign joins the names of several effects, some of which hold the name of a parameter.
+void require_single_name(const std::string& what, const std::string& name) {
+  if (name.find('+') != std::string::npos)
+    throw std::invalid_argument(fmt::format("{}: \"{}\": a name holds no +, which joins several effects", what, name));
+}
+
 void require_parameter(const MachineParameter& p) {
+  require_single_name("parameters", p.name);
   require_finite("parameters: " + p.name, p.nominal);
   if (!(p.sd >= 0) || !std::isfinite(p.sd))
     throw std::invalid_argument(fmt::format("parameters: {}: the sd {} is not in [0, inf)", p.name, p.sd));
@@ -43,13 +50,12 @@ void require_parameter(const MachineParameter& p) {
                                             p.name, p.nominal, p.lower, p.upper));
 }
 
-// These words stand for answers without an effect, and a plus sign joins several effects.
+// These words stand for answers without an effect.
 void require_own_name(const std::string& id) {
   for (const char* taken : {"no_gap", "recalibration", "none_of_these"})
     if (id == taken)
       throw std::invalid_argument(fmt::format("effects: \"{}\" is a name that answers give to no effect", id));
-  if (id.find('+') != std::string::npos)
-    throw std::invalid_argument(fmt::format("effects: \"{}\": a name holds no +, which joins several effects", id));
+  require_single_name("effects", id);
 }
 
 void require_effect(const MachineEffect& effect) {

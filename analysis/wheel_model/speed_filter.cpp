@@ -39,7 +39,8 @@ constexpr std::array<Node, 7> seven_nodes{{{-3.7504397177257425, 5.4826885597221
 // Spreads of omega+ by contacts, in sds of the noise: up to the first the sum over seven contacts is good to half a per
 // cent, from the second on that over three speeds is.
 constexpr double few_contacts = 1.2, few_speeds = 2;
-// An sd of the contact so many times the noise [rad/s] spreads omega+ widely beside it, whichever of the two it is of.
+// Where the sds of restitution and friction are both so many times the noise [rad/s], they spread omega+ widely beside
+// it.
 constexpr double surely_wide = 10;
 constexpr double least_spread = 1e-12;  // [rad/s]
 
@@ -66,7 +67,7 @@ ContactNodes contact_nodes(const dynamics::ContactSpread& contact) {
                   {restitution.at_score(1), mu_median},
                   {eta_median, friction.at_score(-1)},
                   {eta_median, friction.at_score(1)}}};
-  nodes.widest = std::max(contact.restitution_sd, contact.friction_sd);
+  nodes.narrower = std::min(contact.restitution_sd, contact.friction_sd);
   return nodes;
 }
 
@@ -87,7 +88,7 @@ SpeedFilter::SpeedFilter(const Extension& extension, const ScoreTilt& tilt, doub
       told_(memory_ == 0 ? 0 : std::max(0.0, memory(memory_) / memory_)),
       blurred_(noise > least_blur || extension.sensor.noise_sd > least_blur),
       contacts_(std::move(contacts)) {
-  if (contacts_ && contacts_->widest > surely_wide * std::sqrt(noise2_)) contacts_.reset();
+  if (contacts_ && contacts_->narrower > surely_wide * std::sqrt(noise2_)) contacts_.reset();
 }
 
 SpeedFilter::Out SpeedFilter::launch(const Condition& condition, double reported) {
@@ -248,7 +249,7 @@ SpeedFilter::Out SpeedFilter::transition(const ExtendedWheel& wheel, const StepC
   if (wheel.certain()) return certain_transition(wheel, context, plus, rate, blur);
   narrow_ = narrowness(wheel, context, blur);
   if (narrow_.share > 0) sum_over_contacts(wheel, context, plus, rate, narrow_);
-  shown_ = 1 - narrow_.share * blur * blur / (narrow_.variance + blur * blur);
+  shown_ = narrow_.share > 0 ? 1 - narrow_.share * blur * blur / (narrow_.variance + blur * blur) : 1;
   if (narrow_.share == 1) return weighed(narrow_.density, narrow_.below, rate);
   double density = 0, below = 0;
   const auto add = [&](double at, double weight) {

@@ -29,7 +29,7 @@ struct ContactNodes {
   };
   std::vector<Node> all;
   std::array<dynamics::Contact, 4> aside;  ///< restitution an sd below and above its median, then friction so
-  double widest = 0;                       ///< sd of the two
+  double narrower = 0;                     ///< the smaller of the two sds
 };
 
 /// @param contact  of sds > 0

@@ -17,7 +17,7 @@ using dynamics::StepContext;
 // narrow beside the prior: trapezoids of this width in its sds are right to 1e-3 of a likelihood. The others are in sds
 // of the prior.
 constexpr double wide_posterior = 0.5, width = 1.6, widest = 0.8, narrowest = 0.05, farthest = 4.2;
-// Noise of a speed [rad/s] hides a friction at least this times as large.
+// A trial's friction is known to this times the noise of a speed [rad/s] at best, a collision.
 constexpr double told_by_noise = 0.2;
 constexpr double negligible = 8;  // log weight below the largest: four of the posterior's sds away
 

@@ -282,8 +282,8 @@ Evaluation WheelTransitions::evaluate_with(std::span<const double> nuisance, std
 }
 
 // A recalibration whose stated contact is far astray starts from a coarse lattice of means, too: there the likelihood
-// is flat, and no step from what is stated finds the way. So it is about sds that the noise hides: larger ones are
-// tried.
+// is flat, and no step from what is stated finds the way. The likelihood is flat about sds that the noise hides, too,
+// so that a fit starts from larger ones as well.
 std::vector<FitStart> WheelTransitions::starts(std::span<const EffectTerm> terms) const {
   constexpr double astray = 2;     // mean square of the scores as given, of independent standard normals if it is right
   constexpr double wide = 0.08;    // sds of either, with which a mean between two of the lattice still shows

@@ -7,6 +7,7 @@
 
 #include "analysis/fitting/cause_ranking.h"
 #include "analysis/fitting/model_fit.h"
+#include "analysis/fitting/rules.h"
 #include "tests/analysis/line.h"
 
 namespace metastable::analysis {
@@ -33,7 +34,8 @@ TEST(FarSizes, OfStairsAreOnTheTreadThatIsLikeliest) {
   const Stairs model(test::line(3 * tread, 8));
   const Fit recalibrated = fit(model, {3, 0}, {});
   const std::vector<const Candidate*> candidates{&model.candidates()[0]};
-  const std::vector<Candidate> far = with_far_sizes(model, recalibrated, candidates, std::vector<RankedCause>(1), 1);
+  const std::vector<Candidate> far =
+      with_far_sizes(model, recalibrated, candidates, std::vector<RankedCause>(1), Rules{}, 1, {});
   ASSERT_EQ(far.size(), 1U);
   const FreeParameter& p = far[0].parameters[0];
   EXPECT_NEAR(p.likely, 3 * tread, 0.6 * tread);
@@ -47,14 +49,14 @@ TEST(FarSizes, AreNoneWhereAFitHasReachedAsMuch) {
   const std::vector<const Candidate*> candidates{&model.candidates()[0]};
   std::vector<RankedCause> singles(1);
   singles[0].fit = fit(model, {3, 0}, {{candidates[0], {}, {3 * tread}}});
-  EXPECT_TRUE(with_far_sizes(model, recalibrated, candidates, singles, 1).empty());
+  EXPECT_TRUE(with_far_sizes(model, recalibrated, candidates, singles, Rules{}, 1, {}).empty());
 }
 
 TEST(FarSizes, AreNotSoughtWhereNoneIsAsLikely) {
   const Stairs model(test::line(0, 10));
   const Fit recalibrated = fit(model, {3, 0}, {});
   const std::vector<const Candidate*> candidates{&model.candidates()[0]};
-  EXPECT_TRUE(with_far_sizes(model, recalibrated, candidates, std::vector<RankedCause>(1), 1).empty());
+  EXPECT_TRUE(with_far_sizes(model, recalibrated, candidates, std::vector<RankedCause>(1), Rules{}, 1, {}).empty());
 }
 
 }  // namespace

@@ -2,11 +2,14 @@
 
 #include <gtest/gtest.h>
 
+#include <cmath>
 #include <memory>
 #include <string>
 #include <vector>
 
 #include "analysis/diagnosis/diagnosis.h"
+#include "analysis/diagnosis/machine_steps.h"
+#include "analysis/fitting/model_fit.h"
 #include "analysis/machine_model/machine_transitions.h"
 #include "tests/analysis/machine_model/machines.h"
 
@@ -104,6 +107,27 @@ TEST(MachineAnswers, DoNotTakeRowsForWildThatOtherParametersBringBack) {
     ASSERT_EQ(d.verdict, Verdict::explained) << told(d);
     EXPECT_NEAR(d.causes.ranked.front().parameters[0][0].value, 0.05, 0.01);
   }
+}
+
+// Trials begin about 1.2, where a noise below -1.2 is a failure, and go up to 4, where it has to be below -4.
+TEST(MachineAnswers, KnowThatFailuresComeEarly) {
+  Machine machine = linear_machine(0.05);
+  machine.effects.clear();
+  machine.may_vary.clear();
+  machine.parameters = {{"s", 0.5, 0.05, 0.01, 2}};
+  machine.step = [](const MachineBatch& batch) {
+    for (std::size_t i = 0; i < batch.rows; ++i) {
+      batch.next[i] = batch.states[i] / 2 + 2 + batch.value(0, i) * batch.scores[i];
+      batch.failed[i] = batch.scores[i] < -batch.states[i];
+    }
+  };
+  MachineRuns runs =
+      scalar_runs(20, 12, 1.2, 0.05, 3, [](double x, double z, std::size_t) { return x / 2 + 2 + 0.5 * std::abs(z); });
+  const auto model = machine_transitions(std::make_shared<const Machine>(machine), std::move(runs));
+  StepsBeforeFailure steps;
+  set_later_steps(steps, *model, fit(*model, nominal_values(*model), {}));
+  EXPECT_GT(steps.later_times, 2);
+  EXPECT_GT(steps.later, 1);
 }
 
 }  // namespace
