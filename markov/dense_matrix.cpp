@@ -19,6 +19,13 @@ SymmetricEigen symmetric_eigen(const Eigen::MatrixXd& matrix) {
   return {solver.eigenvalues(), solver.eigenvectors()};
 }
 
+Eigen::MatrixXd symmetric_root(const Eigen::MatrixXd& matrix) {
+  const Eigen::VectorXd unit = matrix.diagonal().cwiseMax(0).cwiseSqrt();
+  const Eigen::VectorXd inverse = unit.unaryExpr([](double one) { return one > 0 ? 1 / one : 0; });
+  const SymmetricEigen split = symmetric_eigen(inverse.asDiagonal() * matrix * inverse.asDiagonal());
+  return unit.asDiagonal() * split.vectors * split.values.cwiseMax(0).cwiseSqrt().asDiagonal();
+}
+
 Eigen::MatrixXd resolved_root(const Eigen::MatrixXd& matrix, const Eigen::VectorXd& whole, double least_share) {
   if (!matrix.allFinite() || !whole.allFinite()) return Eigen::MatrixXd::Constant(whole.size(), whole.size(), NAN);
   const Eigen::VectorXd unit =

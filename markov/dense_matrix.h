@@ -23,6 +23,10 @@ struct SymmetricEigen {
 /// @param matrix  [n x n], n >= 1, of which the lower triangle is read
 SymmetricEigen symmetric_eigen(const Eigen::MatrixXd& matrix);
 
+/// Returns R [n x n], R R^T being the symmetric matrix, of which negative eigenvalues count as 0. Its rows may have
+/// units that are far apart: it is split in units of its diagonal.
+Eigen::MatrixXd symmetric_root(const Eigen::MatrixXd& matrix);
+
 /// Returns the root R [n x r] of the pseudo-inverse R R^T of a symmetric semidefinite matrix, over the r directions of
 /// which more is left than a share: eigenvectors of the matrix in units of `whole` whose eigenvalue is above it. What
 /// else there is, rounding or the errors of differences, counts as nothing.

@@ -25,6 +25,7 @@
 #include "analysis/diagnosis/not_possible.h"
 #include "analysis/diagnosis/parameter_estimates.h"
 #include "analysis/diagnosis/verdict.h"
+#include "analysis/diagnosis/wanted_effects.h"
 #include "analysis/fitting/bayes_factor.h"
 #include "analysis/fitting/cause_ranking.h"
 #include "analysis/fitting/far_sizes.h"
@@ -88,72 +89,12 @@ Elsewhere asked_elsewhere(const TransitionModel& model, const DiagnosisOptions& 
   return options.elsewhere.empty() ? Elsewhere{} : model.elsewhere(options.elsewhere);
 }
 
-// Returns the one or two effects that an entry of the options names.
-std::vector<std::string> effects_of(const std::string& entry) {
-  const auto plus = entry.find('+');
-  std::vector<std::string> ids{entry.substr(0, plus)};
-  if (plus != std::string::npos) ids.push_back(entry.substr(plus + 1));
-  if (ids.front() == ids.back() && ids.size() == 2)
-    throw std::invalid_argument(fmt::format("effect: \"{}\" is not a pair of two effects", entry));
-  return ids;
-}
-
 void check(const TransitionModel& model, const DiagnosisOptions& options) {
   if (options.draws < 200) throw std::invalid_argument(fmt::format("draws: {} is below 200", options.draws));
   if (options.folds < 2) throw std::invalid_argument(fmt::format("folds: {} is below 2", options.folds));
   if (!(options.level > 0 && options.level < 0.5))
     throw std::invalid_argument(fmt::format("level: {} is outside (0, 0.5)", options.level));
-  const std::vector<std::string> known = model.effect_ids();
-  for (const std::string& entry : options.catalogue)
-    for (const std::string& id : effects_of(entry))
-      if (std::ranges::find(known, id) == known.end())
-        throw std::invalid_argument(fmt::format("effect: \"{}\" is none of {}", id, fmt::join(known, ", ")));
-}
-
-// Pairs alone extend the whole catalogue; beside single effects they add theirs.
-std::vector<const Candidate*> wanted(const TransitionModel& model, const std::vector<std::string>& catalogue) {
-  std::vector<std::string> ids;
-  bool restricted = false;
-  for (const std::string& entry : catalogue) {
-    const std::vector<std::string> named = effects_of(entry);
-    restricted = restricted || named.size() == 1;
-    ids.insert(ids.end(), named.begin(), named.end());
-  }
-  std::vector<const Candidate*> candidates;
-  for (const Candidate& candidate : model.candidates())
-    if (!restricted || std::find(ids.begin(), ids.end(), candidate.id) != ids.end()) candidates.push_back(&candidate);
-  // An effect without parameters, as another contact law, is compared as a whole: it has no score of which chance could
-  // be drawn.
-  const auto scanned = [](const Candidate* one) { return one->undecidable.empty() && !one->parameters.empty(); };
-  if (std::ranges::none_of(candidates, scanned)) {
-    std::string why;
-    if (std::ranges::find(ids, model.recalibration_id()) != ids.end())
-      why += fmt::format("; {}: the recalibration fits it in any case", model.recalibration_id());
-    for (const Candidate* one : candidates)
-      why += fmt::format(
-          "; {}: {}", one->id,
-          one->undecidable.empty() ? "it has no parameters: name another effect beside it" : one->undecidable);
-    throw std::invalid_argument(fmt::format("catalogue: these data under this law can show none of {}{}",
-                                            ids.empty() ? "its effects" : fmt::format("{}", fmt::join(ids, ", ")),
-                                            why));
-  }
-  return candidates;
-}
-
-std::vector<std::pair<const Candidate*, const Candidate*>> wanted_pairs(const std::vector<const Candidate*>& candidates,
-                                                                        const std::vector<std::string>& catalogue) {
-  const auto find = [&](const std::string& id) {
-    const auto found =
-        std::find_if(candidates.begin(), candidates.end(), [&](const Candidate* c) { return c->id == id; });
-    return found == candidates.end() ? nullptr : *found;
-  };
-  std::vector<std::pair<const Candidate*, const Candidate*>> pairs;
-  for (const std::string& entry : catalogue) {
-    const std::vector<std::string> named = effects_of(entry);
-    const Candidate *one = find(named.front()), *other = find(named.back());
-    if (one && other && one != other) pairs.emplace_back(one, other);
-  }
-  return pairs;
+  require_known_effects(model, options.catalogue);
 }
 
 // Evaluates the model without anything fitted: nothing to project out.
@@ -570,7 +511,7 @@ Diagnosis diagnose(const TransitionModel& model, const DiagnosisOptions& options
   const Elsewhere elsewhere = asked_elsewhere(model, options);
   const Fitted fitted = fit_models(model, candidates, options, progress);
   Decided decided = decide(model, fitted, candidates, options, progress);
-  // Where something has no name, an effect may have been missed whose likely size no slope leads to.
+  // A gap without a name may come of an effect that fits missed, because no slope leads to its likely size.
   if (decided.d.verdict == Verdict::unexplained || decided.d.verdict == Verdict::partly_explained) {
     const std::vector<Candidate> far =
         with_far_sizes(model, fitted.recalibrated, candidates, fitted.ranking.singles, options.rules, options.threads,

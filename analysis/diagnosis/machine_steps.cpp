@@ -47,17 +47,10 @@ Fit drawn_fit(const TransitionModel& model, const Fit& fit, std::uint64_t seed, 
     const Eigen::VectorXd moved = model.nuisances()[p].form_sd / by_data(at, at) * by_data.col(at);
     covariance += moved * moved.transpose();
   }
-  // Parameters may have units that are far apart: the matrix is split in units of its diagonal.
-  const Eigen::VectorXd unit = covariance.diagonal().cwiseMax(0).cwiseSqrt();
-  const Eigen::VectorXd inverse = unit.unaryExpr([](double one) { return one > 0 ? 1 / one : 0; });
-  const markov::SymmetricEigen split =
-      markov::symmetric_eigen(inverse.asDiagonal() * covariance * inverse.asDiagonal());
   const std::vector<double> normals =
       normal_multipliers(seed, draw, DrawStream::steps, static_cast<std::size_t>(covariance.rows()));
-  Eigen::VectorXd shift = Eigen::VectorXd::Zero(covariance.rows());
-  for (Eigen::Index k = 0; k < shift.size(); ++k)
-    shift += std::sqrt(std::max(0.0, split.values[k])) * normals[static_cast<std::size_t>(k)] * split.vectors.col(k);
-  shift = shift.cwiseProduct(unit);
+  const Eigen::VectorXd shift =
+      markov::symmetric_root(covariance) * Eigen::VectorXd::Map(normals.data(), covariance.rows());
   Eigen::Index at = 0;
   for (std::size_t p = 0; p < drawn.nuisance.size(); ++p) {
     const Nuisance& n = model.nuisances()[p];

@@ -321,13 +321,7 @@ Eigen::MatrixXd rows_of_chance(const EffectScan& scan) {
   const double trials = static_cast<double>(rows.rows());
   const Eigen::ArrayXd scatter = rows.colwise().squaredNorm().transpose() * (trials / std::max(1.0, trials - 1));
   const Eigen::ArrayXd own = scan.information.diagonal().cwiseMax(resolved_share * scan.whole).array().max(1e-300);
-  // Parameters may have units that are far apart: the matrix is split in units of its diagonal.
-  const Eigen::VectorXd unit = scan.information.diagonal().cwiseMax(0).cwiseSqrt();
-  const Eigen::VectorXd inverse = unit.unaryExpr([](double one) { return one > 0 ? 1 / one : 0; });
-  const markov::SymmetricEigen split =
-      markov::symmetric_eigen(inverse.asDiagonal() * scan.information * inverse.asDiagonal());
-  rows = split.values.cwiseMax(0).cwiseSqrt().asDiagonal() * split.vectors.transpose() * unit.asDiagonal() *
-         (scatter / own).max(1).sqrt().matrix().asDiagonal();
+  rows = markov::symmetric_root(scan.information).transpose() * (scatter / own).max(1).sqrt().matrix().asDiagonal();
   return rows;
 }
 

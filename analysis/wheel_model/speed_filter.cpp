@@ -39,8 +39,7 @@ constexpr std::array<Node, 7> seven_nodes{{{-3.7504397177257425, 5.4826885597221
 // Spreads of omega+ by contacts, in sds of the noise: up to the first the sum over seven contacts is good to half a per
 // cent, from the second on that over three speeds is.
 constexpr double few_contacts = 1.2, few_speeds = 2;
-// Where the sds of restitution and friction are both so many times the noise [rad/s], they spread omega+ widely beside
-// it.
+// Restitution and friction spread omega+ widely beside the noise [rad/s] if the sd of each is so many times the noise.
 constexpr double surely_wide = 10;
 constexpr double least_spread = 1e-12;  // [rad/s]
 
@@ -269,7 +268,8 @@ SpeedFilter::Out SpeedFilter::transition(const ExtendedWheel& wheel, const StepC
                    : weighed(density, below, rate);
 }
 
-// Says by how much contacts spread omega+ and which share the sum over them has beside that noise of omega+ [rad/s].
+// Returns by how much contacts spread omega+, and the share that the sum over contacts has where the noise of omega+ is
+// `blur` [rad/s].
 SpeedFilter::Narrow SpeedFilter::narrowness(const ExtendedWheel& wheel, const StepContext& context, double blur) const {
   Narrow narrow;
   if (!contacts_ || wheel.settles() || wheel.certain()) return narrow;

@@ -66,7 +66,9 @@ TrialFollower::TrialFollower(const WheelRuns& measured, const WheelRun& run, con
       filters_(nodes_.size(),
                SpeedFilter(hypothesis.extension, hypothesis.tilt, hypothesis.noise.value_or(measured.noise),
                            measured.slack, measured.law_error, measured.slide_error, measured.memory,
-                           std::make_shared<const ContactNodes>(contact_nodes(hypothesis.contact)))) {
+                           wheel.settles() || wheel.certain()
+                               ? nullptr
+                               : std::make_shared<const ContactNodes>(contact_nodes(hypothesis.contact)))) {
   for (const ScoreNode& node : nodes_) log_weight_.push_back(std::log(node.weight));
 }
 

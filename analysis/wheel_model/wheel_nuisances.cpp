@@ -10,9 +10,6 @@ namespace {
 // It lets a fit leave them behind at a cost of 4.6 in log likelihood, and no effect gains more by bringing them back.
 constexpr double misstated_contact = 0.01;
 
-// Contacts that are stated to scatter by this or more are not fitted as scattering by less than half of it; the others
-// are, down to what the noise hides.
-constexpr double least_scatter = 0.01;
 // An sd of the contact so many times the noise [rad/s] changes the variance of a noisy speed by less than half a per
 // cent.
 constexpr double hidden_by_noise = 0.01;

@@ -34,6 +34,10 @@ struct WheelSlot {
   };
 };
 
+/// Contacts that are stated to scatter by this sd or more are not fitted as scattering by less than half of it; the
+/// others are, down to what the noise hides.
+inline constexpr double least_scatter = 0.01;
+
 /// Returns the contact as it is stated, with sds that are not 0: one stated to be constant scatters by so little that
 /// the noise hides it. @param noise  sd of reported speeds [rad/s]
 dynamics::ContactSpread stated_contact(const NominalContact& nominal, double noise);

@@ -243,8 +243,8 @@ void blur_digits(WheelRuns& measured, double digits) {
                   added, measured.noise));
 }
 
-// Where contacts are stated to be constant, as under `plastic`, nothing scatters but what is seen: where that is exact
-// to rounding, the normal error of a good sensor is added, against which the model's collisions can be held.
+// Constant contacts, as those of `plastic`, leave speeds that scatter by the error of the sensor alone. If speeds are
+// exact to rounding, the model's collisions cannot be held against them: the normal error of a good sensor is added.
 void blur_exact(WheelRuns& measured) {
   constexpr double added = imagined_noise;
   add_normal_errors(measured, added);
@@ -259,7 +259,7 @@ void blur_exact(WheelRuns& measured) {
   measured.exact_stances = false;
 }
 
-// Says whether nothing scatters but what is seen, and that by rounding alone.
+// Says whether contacts are stated to be constant while speeds are exact to rounding.
 bool repeats_the_model(const WheelRuns& measured) {
   constexpr double most = 3 * finest_noise;
   if (measured.law == dynamics::Law::plastic) return measured.exact_stances;

@@ -285,9 +285,8 @@ Evaluation WheelTransitions::evaluate_with(std::span<const double> nuisance, std
 // is flat, and no step from what is stated finds the way. The likelihood is flat about sds that the noise hides, too,
 // so that a fit starts from larger ones as well.
 std::vector<FitStart> WheelTransitions::starts(std::span<const EffectTerm> terms) const {
-  constexpr double astray = 2;     // mean square of the scores as given, of independent standard normals if it is right
-  constexpr double wide = 0.08;    // sds of either, with which a mean between two of the lattice still shows
-  constexpr double narrow = 0.01;  // a stated sd that noise may hide
+  constexpr double astray = 2;   // mean square of the scores as given, of independent standard normals if it is right
+  constexpr double wide = 0.08;  // sds of either, with which a mean between two of the lattice still shows
   if (!terms.empty()) return {};
   std::vector<double> values = nominal_values(*this);
   const Evaluation given = evaluate(values, {});
@@ -304,7 +303,7 @@ std::vector<FitStart> WheelTransitions::starts(std::span<const EffectTerm> terms
     best = {values, {}};
   };
   const Spread &eta = experiment_.contact.restitution, &mu = experiment_.contact.friction;
-  if (measured_.law != dynamics::Law::settled && (eta.sd < narrow || mu.sd < narrow))
+  if (measured_.law != dynamics::Law::settled && (eta.sd < least_scatter || mu.sd < least_scatter))
     for (const double sd : {0.003, 0.01, 0.03, wide})
       offer({eta.mean, std::max(sd, eta.sd), mu.mean, std::max(sd, mu.sd)});
   if (squares >= astray * static_cast<double>(given.score.size()))

@@ -121,12 +121,21 @@ TEST(RefusingNan, LetsPassWhatIsMarkedAndWhatHasGrownBeyondAllBounds) {
   EXPECT_EQ(said_of({1, 1e200}, {0, 2.5}, false), "nothing was thrown");
 }
 
-TEST(MachineBounds, ThatAreReversedAreCalledSo) {
+// A machine of one state that does not move, and what is said of it.
+class MachineNames : public testing::Test {
+ protected:
+  MachineNames() {
+    machine.states = {"x"};
+    machine.observe = {{"x", 0.1}};
+    machine.step = [](const MachineBatch&) {};
+  }
+  std::string refused() const {
+    return message_of<std::invalid_argument>([&] { machine.require_valid(); });
+  }
   Machine machine;
-  machine.states = {"x"};
-  machine.observe = {{"x", 0.1}};
-  machine.step = [](const MachineBatch&) {};
-  const auto refused = [&] { return message_of<std::invalid_argument>([&] { machine.require_valid(); }); };
+};
+
+TEST_F(MachineNames, AreRefusedWithBoundsThatAreReversed) {
   EXPECT_EQ(refused(), "nothing was thrown");
   machine.parameters = {{"a", 0.5, 0.1, 1, 0}};
   EXPECT_EQ(refused(), "parameters: a: lower is above upper in its bounds [1, 0]");
@@ -137,12 +146,7 @@ TEST(MachineBounds, ThatAreReversedAreCalledSo) {
   EXPECT_EQ(refused(), "effects: bend: c: lower is above upper in its bounds [0.5, -0.5]");
 }
 
-TEST(MachineEffects, HaveNamesOfTheirOwn) {
-  Machine machine;
-  machine.states = {"x"};
-  machine.observe = {{"x", 0.1}};
-  machine.step = [](const MachineBatch&) {};
-  const auto refused = [&] { return message_of<std::invalid_argument>([&] { machine.require_valid(); }); };
+TEST_F(MachineNames, OfEffectsAreTheirOwn) {
   machine.effects = {{"no_gap", {{"c", 0, -0.5, 0.5}}}};
   EXPECT_EQ(refused(), "effects: \"no_gap\" is a name that answers give to no effect");
   machine.effects = {{"drag+friction", {{"c", 0, -0.5, 0.5}}}};
