@@ -49,7 +49,8 @@ struct Condition {
   double ramp_length = 0;               ///< [m]; 0 for a coast-down
   std::optional<Spread> initial_speed;  ///< just before collision 1 [rad/s]
   int first_landing_leg = 0;
-  int day = 1;  ///< on which it was measured, from 1
+  bool first_leg_stated = false;  ///< whether experiment.toml has first_landing_leg, or whoever made this knows it
+  int day = 1;                    ///< on which it was measured, from 1
 };
 
 struct Sensor {

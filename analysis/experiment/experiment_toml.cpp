@@ -255,8 +255,9 @@ void read_conditions(const std::string& file, Keys& root, Experiment& experiment
       const Range slopes = dynamics::slope_range(experiment.wheel.legs());
       condition.slope_deg = keys.number("slope_deg", true, slopes).value_or(0);
       condition.ramp_length = keys.number("ramp_length_m", true, range::ramp_length).value_or(0);
-      condition.first_landing_leg =
-          static_cast<int>(keys.whole("first_landing_leg", false, 0, experiment.wheel.legs() - 1).value_or(0));
+      const auto first = keys.whole("first_landing_leg", false, 0, experiment.wheel.legs() - 1);
+      condition.first_landing_leg = static_cast<int>(first.value_or(0));
+      condition.first_leg_stated = first.has_value();
       condition.day = static_cast<int>(keys.whole("day", false, 1, 1000).value_or(1));
     }
     condition.initial_speed = keys.spread("initial_speed_rad_s", false, wheel ? range::speed : range::rotor_speed);

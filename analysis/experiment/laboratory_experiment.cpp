@@ -142,6 +142,7 @@ Experiment experiment_of(const std::vector<LaboratoryCondition>& conditions, con
     condition.ramp_length = setting.ramp_length;
     if (told("initial_speed_rad_s")) condition.initial_speed = setting.initial_speed;
     condition.first_landing_leg = setting.first_landing_leg;
+    condition.first_leg_stated = true;
   }
   if (options.camera) experiment.sensor.rate = options.camera->rate;
   if (told("noise")) experiment.sensor.noise_sd = setup.sensor_noise;

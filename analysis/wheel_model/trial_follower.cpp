@@ -3,8 +3,8 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
-#include <memory>
 #include <stdexcept>
+#include <utility>
 
 #include "dynamics/numerics/truncated_normal.h"
 
@@ -52,8 +52,14 @@ std::vector<TrialFollower::ScoreNode> TrialFollower::nodes_for(double told) {
   return nodes;
 }
 
+std::shared_ptr<const ContactNodes> TrialFollower::contacts_for(const dynamics::ExtendedWheel& wheel,
+                                                                const WheelHypothesis& hypothesis) {
+  if (wheel.settles() || wheel.certain()) return nullptr;
+  return std::make_shared<const ContactNodes>(contact_nodes(hypothesis.contact));
+}
+
 TrialFollower::TrialFollower(const WheelRuns& measured, const WheelRun& run, const dynamics::ExtendedWheel& wheel,
-                             const WheelHypothesis& hypothesis)
+                             const WheelHypothesis& hypothesis, std::shared_ptr<const ContactNodes> contacts)
     : measured_(measured),
       run_(run),
       wheel_(wheel),
@@ -63,12 +69,9 @@ TrialFollower::TrialFollower(const WheelRuns& measured, const WheelRun& run, con
       nodes_(nodes_for(
           friction_sd_ * std::sqrt(static_cast<double>(run.collisions.size())) /
           std::max(hypothesis.contact.friction_sd, told_by_noise * hypothesis.noise.value_or(measured.noise)))),
-      filters_(nodes_.size(),
-               SpeedFilter(hypothesis.extension, hypothesis.tilt, hypothesis.noise.value_or(measured.noise),
-                           measured.slack, measured.law_error, measured.slide_error, measured.memory,
-                           wheel.settles() || wheel.certain()
-                               ? nullptr
-                               : std::make_shared<const ContactNodes>(contact_nodes(hypothesis.contact)))) {
+      filters_(nodes_.size(), SpeedFilter(hypothesis.extension, hypothesis.tilt,
+                                          hypothesis.noise.value_or(measured.noise), measured.slack, measured.law_error,
+                                          measured.slide_error, measured.memory, std::move(contacts))) {
   for (const ScoreNode& node : nodes_) log_weight_.push_back(std::log(node.weight));
 }
 

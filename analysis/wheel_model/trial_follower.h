@@ -1,6 +1,7 @@
 #pragma once
 // Follows one trial through its events, as wheel_events() lists them.
 
+#include <memory>
 #include <optional>
 #include <vector>
 
@@ -18,10 +19,16 @@ namespace metastable::analysis {
 /// speed.
 class TrialFollower {
  public:
+  /// Returns the contacts that followers sum over, which all trials share; nothing where the wheel's law has no use for
+  /// them.
+  static std::shared_ptr<const ContactNodes> contacts_for(const dynamics::ExtendedWheel& wheel,
+                                                          const WheelHypothesis& hypothesis);
+
   /// All references must outlive the follower.
   /// @param wheel  under the hypothesis, on the ramp of the trial's condition
+  /// @param contacts  contacts_for() this wheel and hypothesis
   TrialFollower(const WheelRuns& measured, const WheelRun& run, const dynamics::ExtendedWheel& wheel,
-                const WheelHypothesis& hypothesis);
+                const WheelHypothesis& hypothesis, std::shared_ptr<const ContactNodes> contacts);
 
   /// Returns the chance that the collision of this event, which comes next, ends in rest; 0 for events of no collision.
   double chance_of_rest(const Event& event);

@@ -17,12 +17,14 @@ void follow(const WheelRuns& measured, const std::vector<Event>& events, const W
             Visit visit) {
   const std::vector<dynamics::ExtendedWheel> wheels =
       wheels_on_ramps(measured, hypothesis.contact, hypothesis.extension);
+  if (wheels.empty()) return;
+  const auto contacts = TrialFollower::contacts_for(wheels.front(), hypothesis);
   std::optional<TrialFollower> follower;
   std::optional<std::size_t> followed;
   for (const Event& event : events) {
     if (followed != event.trial) {
       const WheelRun& run = measured.runs[event.trial];
-      follower.emplace(measured, run, wheels[run.condition], hypothesis);
+      follower.emplace(measured, run, wheels[run.condition], hypothesis, contacts);
       followed = event.trial;
     }
     visit(*follower, event);

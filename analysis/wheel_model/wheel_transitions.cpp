@@ -25,14 +25,21 @@ namespace metastable::analysis {
 WheelRuns runs_with_legs(const Experiment& experiment) {
   constexpr double clearly = 3;  // in log likelihood
   WheelRuns measured = wheel_runs(experiment);
-  if (measured.legs_known || experiment.wheel.equal_legs()) return measured;
+  if (measured.legs_known) return measured;
+  const bool named = std::all_of(experiment.trials.begin(), experiment.trials.end(), [&](const MeasuredTrial& trial) {
+    return experiment.conditions[trial.condition].first_leg_stated;
+  });
+  if (experiment.wheel.equal_legs() && !named) return measured;
   WheelRuns stated = wheel_runs(with_legs_from_the_first(experiment));
   const WheelHypothesis nominal{
       .contact = stated_contact(experiment.contact, stated.noise), .tilt = ScoreTilt(0, 0), .extension = {}};
   const double with = wheel_likelihood(stated, wheel_events(stated), nominal).total();
-  if (!(with > wheel_likelihood(measured, wheel_events(measured), nominal).total() + clearly)) return measured;
-  stated.notes.insert(stated.notes.begin(),
-                      "leg is missing: taken from each condition's first_landing_leg, which the transitions bear out");
+  const double without = wheel_likelihood(measured, wheel_events(measured), nominal).total();
+  if (!(with > without + (named ? -clearly : clearly))) return measured;
+  stated.notes.insert(
+      stated.notes.begin(),
+      named ? "leg is missing: counted from each condition's first_landing_leg, which is stated"
+            : "leg is missing: taken from each condition's first_landing_leg, which the transitions bear out");
   return stated;
 }
 

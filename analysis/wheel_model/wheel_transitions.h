@@ -9,8 +9,9 @@
 
 namespace metastable::analysis {
 
-/// Returns wheel_runs() of an experiment; legs that were neither noted nor found follow from the stated first one,
-/// where the transitions bear that out. @throws std::invalid_argument as wheel_runs()
+/// Returns wheel_runs() of an experiment; legs that were neither noted nor found are counted from each condition's
+/// first_landing_leg: where it is stated unless the transitions contradict it, else where they bear it out.
+/// @throws std::invalid_argument as wheel_runs()
 WheelRuns runs_with_legs(const Experiment& experiment);
 
 /// Names of what TransitionModel::elsewhere() knows of a wheel: the slope [deg], and omega- of the launch [rad/s].
@@ -21,7 +22,7 @@ inline constexpr const char *other_slope = "at-slope", *other_launch = "at-speed
 /// Gaussian filter on the speed (exact while the noise is small beside the spread of a collision). Recalibration refits
 /// the contact's means and sds and a smooth change of shape (ScoreTilt). What was not measured is completed as
 /// wheel_runs() says.
-/// @throws std::invalid_argument for a coast-down, for `plastic`, and for an experiment without a transition
+/// @throws std::invalid_argument for a coast-down and for an experiment without a transition
 std::unique_ptr<TransitionModel> wheel_transitions(const Experiment& experiment);
 
 }  // namespace metastable::analysis

@@ -428,7 +428,7 @@ DescribeRequest describe_request(const Options& o, const std::string& line) {
 void declare_diagnose(Options& o) {
   o.add_place(
       "DIR",
-      "Experiment folder: of a wheel (its [contact] names the law published, coulomb or settled), a drum or walks");
+      "Experiment folder: of a wheel (its [contact] names the law published, coulomb, plastic or settled), a drum or walks");
   o.add("catalogue", "FILE|ID,ID,...", "",
         "Effects to consider, in a list or a file with one a line (default: all of 'metastable effects'); a pair, "
         "trial_drift+bounce, is tried in any case, and a list of pairs alone extends the whole catalogue");

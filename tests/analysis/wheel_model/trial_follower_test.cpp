@@ -48,7 +48,7 @@ TEST(TrialFollower, SeesExactSpeedsAsTheModelsOwnDensities) {
   const WheelRuns measured = exact_runs({3.6, 3.3, 3.5});
   const WheelHypothesis h = hypothesis();
   const dynamics::ExtendedWheel wheel = wheels_on_ramps(measured, contact, {}).front();
-  TrialFollower follower(measured, measured.runs[0], wheel, h);
+  TrialFollower follower(measured, measured.runs[0], wheel, h, TrialFollower::contacts_for(wheel, h));
   int collisions = 0;
   for (const Event& event : wheel_events(measured)) {
     const double chance = follower.chance_of_rest(event);
@@ -104,7 +104,7 @@ TEST_P(OwnFriction, IsIntegratedOver) {
     }
     sum += product;
   }
-  TrialFollower follower(measured, measured.runs[0], wheel, h);
+  TrialFollower follower(measured, measured.runs[0], wheel, h, TrialFollower::contacts_for(wheel, h));
   double followed = 0;
   for (const Event& event : wheel_events(measured)) {
     const double log_density = follower.see(event).log_density;
@@ -139,9 +139,9 @@ TEST(TrialFollower, GoesOnFromTheReportedSpeedWhereNoEventLeadsUpToACollision) {
   const dynamics::ExtendedWheel wheel = wheels_on_ramps(measured, contact, {}).front();
   const std::vector<Event> events = wheel_events(measured);
   ASSERT_EQ(events.size(), 3U);
-  TrialFollower whole(measured, measured.runs[0], wheel, h);
+  TrialFollower whole(measured, measured.runs[0], wheel, h, TrialFollower::contacts_for(wheel, h));
   for (const Event& event : events) {
-    TrialFollower only(measured, measured.runs[0], wheel, h);
+    TrialFollower only(measured, measured.runs[0], wheel, h, TrialFollower::contacts_for(wheel, h));
     EXPECT_EQ(whole.see(event).log_density, only.see(event).log_density) << event.number;
   }
 }
@@ -150,7 +150,9 @@ TEST(TrialFollower, AskingForTheChanceOfRestChangesNothing) {
   const WheelRuns measured = exact_runs({3.6, 3.3, 3.5});
   const WheelHypothesis h = hypothesis(0.02);
   const dynamics::ExtendedWheel wheel = wheels_on_ramps(measured, contact, {}).front();
-  TrialFollower asked(measured, measured.runs[0], wheel, h), not_asked(measured, measured.runs[0], wheel, h);
+  const auto contacts = TrialFollower::contacts_for(wheel, h);
+  TrialFollower asked(measured, measured.runs[0], wheel, h, contacts),
+      not_asked(measured, measured.runs[0], wheel, h, contacts);
   for (const Event& event : wheel_events(measured)) {
     asked.chance_of_rest(event);
     EXPECT_EQ(asked.see(event).log_density, not_asked.see(event).log_density);

@@ -117,6 +117,39 @@ Experiment without_speeds_after(Experiment experiment) {
   return experiment;
 }
 
+// Trials roll with legs of these lengths [m]; neither their legs nor their speeds after collisions are noted.
+Experiment without_legs(std::vector<double> leg_length) {
+  Setting setting;
+  setting.wheel.leg_length = std::move(leg_length);
+  setting.slope_deg = 9.59;
+  setting.restitution = {0.4, 0.02};
+  setting.friction = {0.4, 0.02};
+  setting.initial_speed = {5.8, 0.2};
+  setting.first_landing_leg = 3;
+  const auto rolled = simulate_trials(setting, {.trials = 80, .collisions = 12, .seed = 4});
+  Experiment experiment = without_speeds_after(
+      parse_experiment(source_of(experiment_files({{"ramp", setting, rolled}}, "rolled", {}), "rolled")));
+  experiment.columns.leg = Presence::none;
+  for (MeasuredTrial& trial : experiment.trials)
+    for (MeasuredCollision& collision : trial.collisions) collision.leg.reset();
+  return experiment;
+}
+
+// Equal legs tell nothing about who lands first, so that the statement counts. Legs of different lengths contradict a
+// statement that is wrong.
+TEST(WheelTransitions, CountLegsFromTheFirstOneThatIsStated) {
+  Experiment equal = without_legs(std::vector<double>(8, 0.152));
+  EXPECT_TRUE(runs_with_legs(equal).legs_known);
+  EXPECT_EQ(runs_with_legs(equal).runs[0].collisions[1].context.leg, 4);
+  equal.conditions[0].first_leg_stated = false;
+  EXPECT_FALSE(runs_with_legs(equal).legs_known);
+
+  Experiment unequal = without_legs({0.154, 0.152, 0.150, 0.152, 0.151, 0.153, 0.150, 0.152});
+  EXPECT_TRUE(runs_with_legs(unequal).legs_known);
+  unequal.conditions[0].first_landing_leg = 0;
+  EXPECT_FALSE(runs_with_legs(unequal).legs_known);
+}
+
 // Gives all speeds that noise [rad/s], without stating it.
 Experiment with_noise(Experiment experiment, double noise, std::uint64_t draw = 5) {
   experiment.sensor.noise_sd.reset();
