@@ -41,7 +41,8 @@ std::size_t said_of(const BlindTruth& truth, const BlindAnswer& answer) {
 }
 
 struct AtWorkTally {
-  Proportion none, outside, one, second, both, third, three, two, fourth, mixed, mixed_unnamed, mixed_false;
+  Proportion none, outside, one, second, both, third, three, two, fourth, mixed, mixed_unnamed, mixed_unnamed_left,
+      mixed_false;
   Proportion likely, surely;  // said with 0.8 to 0.95, with 0.95 and more
 };
 
@@ -75,6 +76,8 @@ void count_kind(AtWorkTally& tally, const BlindTruth& truth, const Answer& answe
       if (!all_have_power(truth)) return;
       tally.mixed.count(right == truth.effects.size());
       tally.mixed_unnamed.count(answer && answer->p_unnamed >= unnamed_said);
+      if (truth.left_of_outside.value_or(0) >= power_of_several)
+        tally.mixed_unnamed_left.count(answer && answer->p_unnamed >= unnamed_said);
       return tally.mixed_false.count(wrong);
     case BlindKind::left_out:
       return;
@@ -151,6 +154,7 @@ std::vector<Grade> at_work_grades(const std::vector<BlindTruth>& truths, const s
         {"  a false fourth", tally.fourth, 0, 0.1},
         {"at work: those named beside an outside effect", tally.mixed, 0.8, 1},
         {"  and something unnamed is said", tally.mixed_unnamed, 0.8, 1},
+        {"  the same where the outside effect, too, has power beside them", tally.mixed_unnamed_left, 0.8, 1},
         {"  a false name", tally.mixed_false, 0, 0.1},
         {"said to be at work with 0.8 to 0.95: true", tally.likely, 0.75, 1},
         {"said to be at work with 0.95 and more: true", tally.surely, 0.93, 1}})

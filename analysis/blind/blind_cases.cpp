@@ -344,6 +344,8 @@ void complete_each(BlindTruth& truth, const Experiment& experiment) {
   complete_each(
       truth, [&](const auto& others) { return power_left(experiment, contact, truth.effects, others); },
       [&] { return gap_as_given(experiment, contact, truth.effects); });
+  if (truth.kind == BlindKind::mixed && truth.outside && can_be_weighed(truth.outside->id))
+    truth.left_of_outside = outside_power_left(experiment, contact, *truth.outside, truth.effects);
 }
 
 void complete_each(BlindTruth& truth,

@@ -61,6 +61,8 @@ struct BlindTruth {
   /// The power left of each of several effects, after a recalibration that has the others in the model. It follows from
   /// the rest and the case and is not sealed; empty until complete_each().
   std::vector<double> left_by_effect = {};
+  /// The power left of the outside effect of a mixture, likewise, where it can be weighed.
+  std::optional<double> left_of_outside = {};
   /// The likelihood that the model as given lacks in the mean over experiments, and each effect's part of it. It
   /// follows from the case and is not sealed. It is empty until complete_each(), and where something acts from outside
   /// or is recalibrated.
@@ -112,8 +114,8 @@ BlindCase blind_case(const BlindPlan& plan, int number, std::uint64_t seed, cons
 /// Sets truth.left from the case's own files; a case without an effect that can be weighed keeps 0. A fit takes about a
 /// second.
 void complete_truth(BlindCase& made);
-/// Sets truth.left_by_effect of a case of several effects, by a fit each, and truth.gap_as_given of one or several, by
-/// eight; other kinds stay as they are.
+/// Sets truth.left_by_effect of a case of several effects, by a fit each, truth.left_of_outside of a wheel's mixture,
+/// and truth.gap_as_given of one effect or several, by eight fits; other kinds stay as they are.
 /// @param experiment, walks  the case as it was written
 void complete_each(BlindTruth& truth, const Experiment& experiment);
 void complete_each(BlindTruth& truth, const Walks& walks);

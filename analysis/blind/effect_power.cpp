@@ -19,26 +19,6 @@ namespace {
 constexpr std::uint64_t draws_of_gap = 16;
 constexpr std::size_t fits_of_gap = 4;
 
-dynamics::NominalValues contact_of(const dynamics::NominalValues& stated,
-                                   const std::vector<dynamics::Effect>& effects) {
-  dynamics::NominalValues truth = stated;
-  for (const dynamics::Effect& effect : effects)
-    if (effect.id == dynamics::contact_distribution_id) {
-      truth.restitution_mean = effect.values[0];
-      truth.restitution_sd = effect.values[1];
-      truth.friction_mean = effect.values[2];
-      truth.friction_sd = effect.values[3];
-    }
-  return truth;
-}
-
-std::vector<EffectTerm> terms_of(const TransitionModel& model, const std::vector<dynamics::Effect>& effects) {
-  std::vector<EffectTerm> terms;
-  for (const dynamics::Effect& effect : effects)
-    if (effect.id != dynamics::contact_distribution_id) terms.push_back(fitted_term(model, effect));
-  return terms;
-}
-
 // Nuisances with effects, as a model supposes them.
 struct Supposed {
   std::vector<double> nuisance;
@@ -71,6 +51,26 @@ EffectTerm fitted_term(const TransitionModel& model, const dynamics::Effect& eff
   throw std::invalid_argument(fmt::format("effect {}: the model has no candidate for it", effect.id));
 }
 
+dynamics::NominalValues contact_with(const dynamics::NominalValues& stated,
+                                     const std::vector<dynamics::Effect>& effects) {
+  dynamics::NominalValues truth = stated;
+  for (const dynamics::Effect& effect : effects)
+    if (effect.id == dynamics::contact_distribution_id) {
+      truth.restitution_mean = effect.values[0];
+      truth.restitution_sd = effect.values[1];
+      truth.friction_mean = effect.values[2];
+      truth.friction_sd = effect.values[3];
+    }
+  return truth;
+}
+
+std::vector<EffectTerm> fitted_terms(const TransitionModel& model, const std::vector<dynamics::Effect>& effects) {
+  std::vector<EffectTerm> terms;
+  for (const dynamics::Effect& effect : effects)
+    if (effect.id != dynamics::contact_distribution_id) terms.push_back(fitted_term(model, effect));
+  return terms;
+}
+
 std::vector<double> true_nuisances(const TransitionModel& model, const dynamics::NominalValues& contact) {
   std::vector<double> values = nominal_values(model);
   set_contact(values, {contact.restitution_mean, contact.restitution_sd, contact.friction_mean, contact.friction_sd});
@@ -95,8 +95,8 @@ double expected_power(const PowerDesign& design, const std::vector<dynamics::Eff
       continue;
     }
     const auto model = wheel_transitions(experiment);
-    const std::vector<double> with = true_nuisances(*model, contact_of(contact, effects));
-    sum += 2 * (model->evaluate(with, terms_of(*model, effects)).total() -
+    const std::vector<double> with = true_nuisances(*model, contact_with(contact, effects));
+    sum += 2 * (model->evaluate(with, fitted_terms(*model, effects)).total() -
                 model->evaluate(true_nuisances(*model, contact), {}).total());
   }
   return sum / replicates;
@@ -105,9 +105,9 @@ double expected_power(const PowerDesign& design, const std::vector<dynamics::Eff
 double power_left(const Experiment& experiment, const dynamics::NominalValues& truth,
                   const std::vector<dynamics::Effect>& effects, const std::vector<dynamics::Effect>& kept) {
   const auto model = wheel_transitions(experiment);
-  const std::vector<double> nuisance = true_nuisances(*model, contact_of(truth, effects));
-  const double with = model->evaluate(nuisance, terms_of(*model, effects)).total();
-  return 2 * (with - fit(*model, nuisance, terms_of(*model, kept)).log_likelihood);
+  const std::vector<double> nuisance = true_nuisances(*model, contact_with(truth, effects));
+  const double with = model->evaluate(nuisance, fitted_terms(*model, effects)).total();
+  return 2 * (with - fit(*model, nuisance, fitted_terms(*model, kept)).log_likelihood);
 }
 
 GapAsGiven gap_as_given(const TransitionModel& model, const std::vector<double>& nuisance,
@@ -136,7 +136,7 @@ GapAsGiven gap_as_given(const TransitionModel& model, const std::vector<double>&
 GapAsGiven gap_as_given(const Experiment& experiment, const dynamics::NominalValues& truth,
                         const std::vector<dynamics::Effect>& effects) {
   const auto model = wheel_transitions(experiment);
-  return gap_as_given(*model, true_nuisances(*model, contact_of(truth, effects)), terms_of(*model, effects));
+  return gap_as_given(*model, true_nuisances(*model, contact_with(truth, effects)), fitted_terms(*model, effects));
 }
 
 }  // namespace metastable::analysis

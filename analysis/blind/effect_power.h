@@ -22,6 +22,13 @@ struct PowerDesign {
 /// nuisances)
 EffectTerm fitted_term(const TransitionModel& model, const dynamics::Effect& effect);
 
+/// Returns those of the effects that are no contact_distribution as a wheel's model takes them.
+std::vector<EffectTerm> fitted_terms(const TransitionModel& model, const std::vector<dynamics::Effect>& effects);
+
+/// Returns the contact that is stated, or that of a contact_distribution among the effects.
+dynamics::NominalValues contact_with(const dynamics::NominalValues& stated,
+                                     const std::vector<dynamics::Effect>& effects);
+
 /// Sets the nuisances of a wheel's model to a true contact distribution; the others stay at their nominal values.
 std::vector<double> true_nuisances(const TransitionModel& model, const dynamics::NominalValues& contact);
 

@@ -5,16 +5,14 @@
 #include <algorithm>
 #include <cmath>
 #include <numbers>
-#include <optional>
 #include <stdexcept>
+#include <tuple>
 #include <utility>
 #include <vector>
 
 #include "analysis/blind/effect_power.h"
 #include "analysis/fitting/model_fit.h"
-#include "analysis/wheel_model/wheel_hypothesis.h"
-#include "analysis/wheel_model/wheel_likelihood.h"
-#include "analysis/wheel_model/wheel_nuisances.h"
+#include "analysis/wheel_model/contact_variation.h"
 #include "analysis/wheel_model/wheel_runs.h"
 #include "analysis/wheel_model/wheel_transitions.h"
 
@@ -54,12 +52,71 @@ dynamics::OutsidePlace outside_place(const CollisionPlace& place, const WheelRun
 }
 
 // Returns the log likelihood trial by trial.
-std::vector<double> by_trial(const WheelRuns& measured, const std::vector<Event>& events,
-                             const WheelHypothesis& hypothesis) {
-  const Evaluation seen = wheel_likelihood(measured, events, hypothesis);
-  std::vector<double> sums(measured.runs.size());
-  for (std::size_t i = 0; i < events.size(); ++i) sums[events[i].trial] += seen.log_density[i];
+std::vector<double> by_trial(const TransitionModel& model, const Evaluation& seen, std::size_t trials) {
+  std::vector<double> sums(trials);
+  for (std::size_t i = 0; i < seen.log_density.size(); ++i) sums[model.events()[i].trial] += seen.log_density[i];
   return sums;
+}
+
+// Says by how much the effect changes the contact of each collision. No effect changes more than one aspect.
+Addition contacts_changed(const WheelRuns& measured, const dynamics::OutsideEffect& effect, double phase) {
+  constexpr double least_ratio = 1e-9;  // of a friction whose logarithm is taken
+  const auto change = dynamics::outside_info(effect.id).change;
+  Addition changed;
+  for (std::size_t t = 0; t < measured.runs.size(); ++t) {
+    const WheelRun& run = measured.runs[t];
+    for (std::size_t k = 0; k < run.collisions.size(); ++k) {
+      dynamics::OutsideRatios ratios;
+      const CollisionPlace place = collision_place(run, t, k, run.collisions[k], run.collisions[k].before);
+      if (change) change(effect.size, outside_place(place, measured, phase), ratios);
+      ContactAspect aspect = ContactAspect::mean_friction;
+      double ratio = ratios.friction;
+      if (ratios.restitution != 1)
+        std::tie(aspect, ratio) = std::pair(ContactAspect::mean_restitution, ratios.restitution);
+      if (ratios.scatter != 1) std::tie(aspect, ratio) = std::pair(ContactAspect::scatter_of_friction, ratios.scatter);
+      if (ratio != 1) changed.number = static_cast<std::size_t>(aspect);
+      changed.weights.push_back(std::log(std::max(least_ratio, ratio)));
+    }
+  }
+  return changed;
+}
+
+// Adds a constant torque [N m] to what the terms hold.
+std::vector<EffectTerm> with_torque(const TransitionModel& model, std::vector<EffectTerm> terms, double torque) {
+  if (torque == 0) return terms;
+  const EffectTerm added = fitted_term(model, {"rolling_resistance", {torque}});
+  for (EffectTerm& term : terms)
+    if (term.candidate == added.candidate) {
+      term.values[0] += added.values[0];
+      return terms;
+    }
+  terms.push_back(added);
+  return terms;
+}
+
+// Returns the log likelihood with the effect beside the terms. What trials draw is integrated over.
+double with_outside(const TransitionModel& model, const WheelRuns& measured, const std::vector<double>& nuisance,
+                    const std::vector<EffectTerm>& terms, const dynamics::OutsideEffect& effect) {
+  const std::vector<Drawn> drawn = what_trials_draw(effect);
+  std::vector<std::vector<double>> with;  // [what a trial drew][trial]
+  for (const Drawn& one : drawn)
+    with.push_back(by_trial(model,
+                            model.evaluate_with(nuisance, with_torque(model, terms, one.torque),
+                                                contacts_changed(measured, effect, one.phase)),
+                            measured.runs.size()));
+  double sum = 0;
+  for (std::size_t t = 0; t < measured.runs.size(); ++t) {
+    double largest = with[0][t], likelihood = 0;
+    for (const std::vector<double>& one : with) largest = std::max(largest, one[t]);
+    for (std::size_t d = 0; d < drawn.size(); ++d) likelihood += drawn[d].weight * std::exp(with[d][t] - largest);
+    sum += largest + std::log(likelihood);
+  }
+  return sum;
+}
+
+void require_weighed(const dynamics::OutsideEffect& effect) {
+  if (!can_be_weighed(effect.id))
+    throw std::invalid_argument(fmt::format("outside effect {}: its likelihood is not known", effect.id));
 }
 
 }  // namespace
@@ -78,47 +135,24 @@ std::set<std::string> columns_needed(std::string_view outside) {
 
 double outside_power(const Experiment& experiment, const dynamics::NominalValues& contact,
                      const dynamics::OutsideEffect& effect) {
-  if (!can_be_weighed(effect.id))
-    throw std::invalid_argument(fmt::format("outside effect {}: its likelihood is not known", effect.id));
-  const WheelRuns measured = runs_with_legs(experiment);
-  const std::vector<Event> events = wheel_events(measured);
-  std::vector<double> nuisance;
-  for (const Nuisance& one : wheel_nuisances(experiment.contact, std::nullopt)) nuisance.push_back(one.nominal);
-  set_contact(nuisance, {contact.restitution_mean, contact.restitution_sd, contact.friction_mean, contact.friction_sd});
-  const WheelHypothesis without = hypothesis_at(nuisance);
-  const auto change = dynamics::outside_info(effect.id).change;
-  const std::vector<Drawn> drawn = what_trials_draw(effect);
-  std::vector<std::vector<double>> with;  // [what a trial drew][trial]
-  for (const Drawn& one : drawn) {
-    WheelHypothesis h = without;
-    h.extension.torques.rolling += one.torque;
-    if (change)
-      h.varied = [&](const CollisionPlace& place, dynamics::StepContext& step) {
-        dynamics::OutsideRatios ratios;
-        change(effect.size, outside_place(place, measured, one.phase), ratios);
-        step.friction_ratio *= std::max(0.0, ratios.friction);
-        step.friction_scatter *= ratios.scatter;
-        step.restitution_ratio *= ratios.restitution;
-      };
-    with.push_back(by_trial(measured, events, h));
-  }
-  double sum = 0;
-  const std::vector<double> before = by_trial(measured, events, without);
-  for (std::size_t t = 0; t < before.size(); ++t) {
-    double largest = with[0][t], likelihood = 0;
-    for (const std::vector<double>& one : with) largest = std::max(largest, one[t]);
-    for (std::size_t d = 0; d < drawn.size(); ++d) likelihood += drawn[d].weight * std::exp(with[d][t] - largest);
-    sum += largest + std::log(likelihood) - before[t];
-  }
-  return 2 * sum;
+  require_weighed(effect);
+  const auto model = wheel_transitions(experiment);
+  const std::vector<double> nuisance = true_nuisances(*model, contact);
+  return 2 * (with_outside(*model, runs_with_legs(experiment), nuisance, {}, effect) -
+              model->evaluate(nuisance, {}).total());
 }
 
 double outside_power_left(const Experiment& experiment, const dynamics::NominalValues& contact,
-                          const dynamics::OutsideEffect& effect) {
+                          const dynamics::OutsideEffect& effect, const std::vector<dynamics::Effect>& beside) {
+  require_weighed(effect);
   const auto model = wheel_transitions(experiment);
-  const std::vector<double> nuisance = true_nuisances(*model, contact);
-  const double gained = fit(*model, nuisance, {}).log_likelihood - model->evaluate(nuisance, {}).total();
-  return outside_power(experiment, contact, effect) - 2 * gained;
+  const WheelRuns measured = runs_with_legs(experiment);
+  const std::vector<double> nuisance = true_nuisances(*model, contact_with(contact, beside));
+  const std::vector<EffectTerm> terms = fitted_terms(*model, beside);
+  const Fit without = fit(*model, nuisance, terms);
+  const double truth = std::max(with_outside(*model, measured, nuisance, terms, effect),
+                                with_outside(*model, measured, without.nuisance, without.terms, effect));
+  return 2 * (truth - without.log_likelihood);
 }
 
 }  // namespace metastable::analysis

@@ -5,6 +5,7 @@
 #include <set>
 #include <string>
 #include <string_view>
+#include <vector>
 
 #include "analysis/experiment/experiment.h"
 #include "analysis/experiment/laboratory_experiment.h"
@@ -24,9 +25,11 @@ std::set<std::string> columns_needed(std::string_view outside);
 double outside_power(const Experiment& experiment, const dynamics::NominalValues& contact,
                      const dynamics::OutsideEffect& effect);
 
-/// Returns 2 log(likelihood of the truth / of the best recalibrated model without the effect).
+/// Returns 2 log(likelihood of the truth / of the best recalibrated model without the effect). No model states the
+/// skewness of a contact: the truth is taken with the true or with the refitted contact, whichever is likelier.
+/// @param beside  effects of the catalogue that both have; their sizes are refitted where the effect is lacking
 /// @throws std::invalid_argument for an effect that cannot be weighed
 double outside_power_left(const Experiment& experiment, const dynamics::NominalValues& contact,
-                          const dynamics::OutsideEffect& effect);
+                          const dynamics::OutsideEffect& effect, const std::vector<dynamics::Effect>& beside = {});
 
 }  // namespace metastable::analysis

@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include <stdexcept>
+#include <vector>
 
 #include "tests/analysis/blind/power_design.h"
 
@@ -45,20 +46,32 @@ TEST(OutsidePower, WhatActsThroughThePastHasNoLikelihood) {
   }
 }
 
+// Returns what is left of an outside effect's power: of that in the same experiment, or, where these of the catalogue
+// act, too, of what it has without them.
+double left_of(const dynamics::OutsideEffect& effect, const std::vector<dynamics::Effect>& beside = {}) {
+  PowerDesign design = two_ramps();
+  design.laboratory.outside = {effect};
+  design.laboratory.effects = beside;
+  design.laboratory.seed = 4;
+  const dynamics::LaboratorySetup setup = laboratory_setup(design.conditions, design.laboratory);
+  const Experiment made = experiment_of(design.conditions, setup, run_laboratory(setup, 1), {});
+  const Setting& stated = design.conditions[0].setting;
+  const dynamics::NominalValues contact = stated_values(stated.restitution, stated.friction, stated.wheel.leg_length);
+  return outside_power_left(made, contact, effect, beside) /
+         (beside.empty() ? outside_power(made, contact, effect) : power_of(effect));
+}
+
 // Every other trial's friction is nobody's mean; that of the last of two conditions is half in the means.
 TEST(OutsidePower, RecalibrationTakesWhatMeansHold) {
-  const auto left = [](const dynamics::OutsideEffect& effect) {
-    PowerDesign design = two_ramps();
-    design.laboratory.outside = {effect};
-    design.laboratory.seed = 4;
-    const dynamics::LaboratorySetup setup = laboratory_setup(design.conditions, design.laboratory);
-    const Experiment made = experiment_of(design.conditions, setup, run_laboratory(setup, 1), {});
-    const Setting& stated = design.conditions[0].setting;
-    const dynamics::NominalValues contact = stated_values(stated.restitution, stated.friction, stated.wheel.leg_length);
-    return outside_power_left(made, contact, effect) / outside_power(made, contact, effect);
-  };
-  EXPECT_GT(left({"two_crews", 0.06}), 0.8);
-  EXPECT_LT(left({"wet_day", 0.1}), 0.7);
+  EXPECT_GT(left_of({"two_crews", 0.06}), 0.8);
+  EXPECT_LT(left_of({"wet_day", 0.1}), 0.7);
+}
+
+// A leg that wears shows beside another leg of more friction. A friction that rises and falls over the trials is half a
+// drift.
+TEST(OutsidePower, EffectsOfTheCatalogueTakeWhatTheyImitate) {
+  EXPECT_GT(left_of({"wearing_leg", 0.2}, {{"leg_contact", {5, 1.3, 1}}}), 0.5);
+  EXPECT_LT(left_of({"daily_cycle", 0.06}, {{"trial_drift", {0.3}}}), 0.6);
 }
 
 }  // namespace
