@@ -342,7 +342,10 @@ void complete_truth(BlindCase& made) {
 void complete_each(BlindTruth& truth, const Experiment& experiment) {
   const dynamics::NominalValues contact = stated_values(truth.restitution, truth.friction, experiment.wheel.leg_length);
   complete_each(
-      truth, [&](const auto& others) { return power_left(experiment, contact, truth.effects, others); },
+      truth,
+      [&](const auto& others) {
+        return power_left(experiment, contact, truth.effects, others, truth.kind == BlindKind::mixed);
+      },
       [&] { return gap_as_given(experiment, contact, truth.effects); });
   if (truth.kind == BlindKind::mixed && truth.outside && can_be_weighed(truth.outside->id))
     truth.left_of_outside = outside_power_left(experiment, contact, *truth.outside, truth.effects);
@@ -356,8 +359,7 @@ void complete_each(BlindTruth& truth,
   truth.gap_as_given.reset();
   if (!truth.outside && !truth.effects.empty() && std::ranges::none_of(truth.effects, recalibrated))
     truth.gap_as_given = gap();
-  if (truth.kind == BlindKind::mixed && truth.effects.size() == 1) truth.left_by_effect = {truth.left};
-  if (truth.effects.size() < 2) return;
+  if (truth.effects.size() < 2 && truth.kind != BlindKind::mixed) return;
   for (std::size_t one = 0; one < truth.effects.size(); ++one) {
     std::vector<dynamics::Effect> others = truth.effects;
     others.erase(others.begin() + static_cast<std::ptrdiff_t>(one));

@@ -58,8 +58,8 @@ struct BlindTruth {
   int strength = 0;  ///< 1, 2, 4; by size alone where an outside effect cannot be weighed; 0: not defined (none)
   double power = 0;  ///< expected 2 Delta log likelihood, true contact known
   double left = 0;   ///< realised, after recalibration; 0 until complete_truth()
-  /// The power left of each of several effects, after a recalibration that has the others in the model. It follows from
-  /// the rest and the case and is not sealed; empty until complete_each().
+  /// The power left of each of several effects, or of the one of a mixture, after a recalibration that has the others
+  /// in the model. It follows from the rest and the case and is not sealed; empty until complete_each().
   std::vector<double> left_by_effect = {};
   /// The power left of the outside effect of a mixture, likewise, where it can be weighed.
   std::optional<double> left_of_outside = {};

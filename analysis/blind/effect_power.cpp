@@ -103,10 +103,12 @@ double expected_power(const PowerDesign& design, const std::vector<dynamics::Eff
 }
 
 double power_left(const Experiment& experiment, const dynamics::NominalValues& truth,
-                  const std::vector<dynamics::Effect>& effects, const std::vector<dynamics::Effect>& kept) {
+                  const std::vector<dynamics::Effect>& effects, const std::vector<dynamics::Effect>& kept,
+                  bool fitted) {
   const auto model = wheel_transitions(experiment);
   const std::vector<double> nuisance = true_nuisances(*model, contact_with(truth, effects));
-  const double with = model->evaluate(nuisance, fitted_terms(*model, effects)).total();
+  const std::vector<EffectTerm> terms = fitted_terms(*model, effects);
+  const double with = fitted ? fit(*model, nuisance, terms).log_likelihood : model->evaluate(nuisance, terms).total();
   return 2 * (with - fit(*model, nuisance, fitted_terms(*model, kept)).log_likelihood);
 }
 

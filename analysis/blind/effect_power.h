@@ -41,8 +41,11 @@ double expected_power(const PowerDesign& design, const std::vector<dynamics::Eff
 /// Returns 2 log(likelihood of the truth / of the best recalibrated model without the effects) on one experiment: what
 /// is left to be found once the contact is refitted.
 /// @param kept  effects that the recalibrated model has, their sizes refitted too: what the others leave beside them
+/// @param fitted  whether the true contact and sizes are refitted, too: they are not the likeliest where something acts
+///     that no model of the catalogue has
 double power_left(const Experiment& experiment, const dynamics::NominalValues& truth,
-                  const std::vector<dynamics::Effect>& effects, const std::vector<dynamics::Effect>& kept = {});
+                  const std::vector<dynamics::Effect>& effects, const std::vector<dynamics::Effect>& kept = {},
+                  bool fitted = false);
 
 /// Holds what the model as given lacks in likelihood, in the mean over experiments like the one it was asked of.
 struct GapAsGiven {

@@ -239,15 +239,19 @@ void complete_walker_truth(BlindCase& made) {
 
 void complete_each(BlindTruth& truth, const Walks& walks) {
   complete_each(
-      truth, [&](const auto& others) { return walk_power_left(walks, *truth.slope_deg, truth.effects, others); },
+      truth,
+      [&](const auto& others) {
+        return walk_power_left(walks, *truth.slope_deg, truth.effects, others, truth.kind == BlindKind::mixed);
+      },
       [&] { return walk_gap_as_given(walks, *truth.slope_deg, truth.effects); });
 }
 
 double walk_power_left(const Walks& walks, const Spread& slope_deg, const std::vector<dynamics::Effect>& effects,
-                       const std::vector<dynamics::Effect>& kept) {
+                       const std::vector<dynamics::Effect>& kept, bool fitted) {
   const auto model = machine_transitions(walks.machine, walks.runs);
   const std::vector<double> nuisance = true_slope(*model, slope_with(slope_deg, effects));
-  const double with = model->evaluate(nuisance, walk_terms(*model, effects)).total();
+  const std::vector<EffectTerm> terms = walk_terms(*model, effects);
+  const double with = fitted ? fit(*model, nuisance, terms).log_likelihood : model->evaluate(nuisance, terms).total();
   return 2 * (with - fit(*model, nuisance, walk_terms(*model, kept)).log_likelihood);
 }
 

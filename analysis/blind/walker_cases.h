@@ -19,8 +19,8 @@ void complete_walker_truth(BlindCase& made);
 
 /// Returns 2 log(likelihood of the truth / of the best recalibrated model without the effects) on these walks.
 /// @param slope_deg  true mean and sd from step to step
-/// @param kept       effects that the recalibrated model has, their sizes refitted too
+/// @param kept, fitted  as in power_left()
 double walk_power_left(const Walks& walks, const Spread& slope_deg, const std::vector<dynamics::Effect>& effects,
-                       const std::vector<dynamics::Effect>& kept = {});
+                       const std::vector<dynamics::Effect>& kept = {}, bool fitted = false);
 
 }  // namespace metastable::analysis
