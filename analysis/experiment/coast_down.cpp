@@ -25,6 +25,9 @@ constexpr int least_block = 10;                          // revolutions
 constexpr std::size_t around = 5;                        // periods on either side that a period is compared with
 constexpr double missed_from = 1.5, double_below = 0.6;  // of the median period
 constexpr double most_left_out = 0.1;                    // of a run's revolutions
+// A top speed [rad/s] of 29,000 revolutions a minute: drums of test stands stay below a tenth of it, and times in
+// milliseconds, which the log has in microseconds, would make them a thousand times as fast.
+constexpr double fastest_drum = 3000;
 constexpr double whole_turn = 2 * std::numbers::pi;
 constexpr double huber = 1.345;  // 95 % efficiency under normal noise
 constexpr std::array<const char*, 5> columns{"time_us", "drum_speed_km_h", "drum_revolutions", "wheel_speed_km_h",
@@ -264,6 +267,10 @@ std::string objection(const CoastDownRun& run, const RevolutionLoss& nominal) {
         "{}: {} of {} revolutions left out for ticks that were missed, double or displaced, more than a "
         "tenth",
         run.name, run.left_out, run.revolutions);
+  if (run.top > fastest_drum)
+    return fmt::format(
+        "{}: a top speed of {:.3g} rad/s, where a drum turns at {:g} at most: is time_us in microseconds?", run.name,
+        run.top, fastest_drum);
   // A parabola is least at an end or at its vertex.
   double least = std::min(nominal.at(run.stop), nominal.at(run.top));
   const double vertex = nominal.quadratic > 0 ? -nominal.linear / (2 * nominal.quadratic) : 0;

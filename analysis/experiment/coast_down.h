@@ -69,8 +69,8 @@ struct LossFit {
 /// @throws std::invalid_argument for fewer than 20 transitions
 LossFit fit_loss(const std::vector<CoastDownRun>& runs, bool linear);
 
-/// Returns what keeps a run from being a basis for anything: more than a tenth of its revolutions left out, or a loss
-/// that is not positive over its speeds. "" where nothing does.
+/// Returns what keeps a run from being a basis for anything: more than a tenth of its revolutions left out, a loss
+/// that is not positive over its speeds, or speeds that no drum has. "" where nothing does.
 std::string objection(const CoastDownRun& run, const RevolutionLoss& nominal);
 
 /// Returns by how much the loss differs between runs of one drum: an sd, as a share of the loss, over the speeds that

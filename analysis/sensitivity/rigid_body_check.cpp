@@ -20,15 +20,17 @@ namespace metastable::analysis {
 namespace {
 
 constexpr std::uint64_t longest_roll = 512;  // collisions of a wheel
-constexpr std::uint64_t early = 32;  // collisions after which the launch is forgotten (by the 12th in all studies)
-constexpr std::size_t wheels_a_batch = 16;  // wheels between two looks at what has been rolled
-constexpr double differing = 2;             // times as many or as few steps
+constexpr std::uint64_t least_early = 32;    // collisions after which the launch is forgotten (by the 12th of 8 legs)
+constexpr double forgotten = 0.01;           // what is left of a launch that is
+constexpr std::size_t wheels_a_batch = 16;   // wheels between two looks at what has been rolled
+constexpr double differing = 2;              // times as many or as few steps
 // The speed at which a wheel spins that hops away down the slope, for ever, times the speed sqrt(g / leg) at which
 // gravity no longer holds a standing foot down: none with feet that settle comes near it.
 constexpr double hops_away = 10;
 
 // Holds what a number of wheels did.
 struct Rolled {
+  std::uint64_t early = least_early;
   std::size_t wheels = 0, past = 0;  // all, and those that roll on after the first `early` steps
   double early_steps = 0, early_squares = 0;
   double late_steps = 0, late_rests = 0;
@@ -74,6 +76,14 @@ void estimate(const Rolled& of, bool away, RigidBodyCheck& check) {
   const double less = std::hypot(std::log(share.value / share.lower), std::log(most / of.late_rests));
   const double more = std::hypot(std::log(share.upper / share.value), std::log(of.late_rests / fewest));
   check.steps = {mean + late, low + late * std::exp(-less), high + late * std::exp(more)};
+}
+
+// Returns after how many collisions little is left of a launch. A wheel whose feet neither slip nor rebound (McGeer's)
+// keeps this share of what squared speeds differ by; one that does forgets sooner.
+// @param gyration  of the wheel about its hub, as a share of a leg
+double forgets_after(const dynamics::Wheel& wheel, double gyration) {
+  const double hub = gyration * gyration, kept = (std::cos(wheel.leg_angle()) + hub) / (1 + hub);
+  return kept * kept < 1 ? std::log(forgotten) / std::log(kept * kept) : infinite;
 }
 
 bool one_contact(const dynamics::ContactNoise& noise, const Setting& setting) {
@@ -168,10 +178,17 @@ RigidBodyCheck rigid_body_check(const Setting& setting, const RigidBodyOptions& 
     check.reason = error.what();
     return check;
   }
+  const double forgets = forgets_after(rigid.wheel, motion->wheel().radius_of_gyration / rigid.wheel.mean_leg_length());
+  if (forgets > static_cast<double>(longest_roll) / 2) {
+    check.reason =
+        fmt::format("with {} legs a launch is forgotten after {:.0f} collisions, and wheels are rolled over {} at most",
+                    rigid.wheel.legs(), forgets, longest_roll);
+    return check;
+  }
   const dynamics::ContactNoise noise = rigid.noise();
   const dynamics::LaunchSpeed launch = rigid.launch();
   const bool same_contacts = one_contact(noise, rigid), once = same_contacts && launch.constant();
-  Rolled rolled;
+  Rolled rolled{.early = std::max(least_early, static_cast<std::uint64_t>(std::ceil(forgets)))};
   const double fastest = hops_away * std::sqrt(rigid.wheel.gravity / rigid.wheel.mean_leg_length());
   bool any_away = false;
   std::vector<dynamics::RolledOn> wheels(once ? 1 : wheels_a_batch);

@@ -23,7 +23,8 @@ struct RigidBodyOptions {
 
 /// Holds the expected steps of a setting under `settled`, by direct simulation.
 struct RigidBodyCheck {
-  std::string reason;  ///< why there is no answer, empty otherwise: `settled` has no such wheel
+  std::string reason;  ///< why there is no answer, empty otherwise: `settled` has no such wheel, or
+                       ///< wheels of so many legs would have to be rolled too far
   Estimate steps;      ///< from the launch, with the 95 % interval
   /// Nothing bounds it above, for too few rests or because some wheel hops away for ever: `steps` has the lower 95 %
   /// bound as value and lower end.
@@ -32,8 +33,9 @@ struct RigidBodyCheck {
 };
 
 /// Rolls wheels of the setting with `settled` in the place of its law and the same launch, each over 512 collisions at
-/// most. The expected steps are the mean of what comes within the first 32 collisions, and for the share that rolls on
-/// the collisions over rests from there, when the launch is long forgotten. A wheel without any noise is followed once,
+/// most. The expected steps are the mean of what comes within the first 32 collisions (up to 256 of many legs), and for
+/// the share that rolls on the collisions over rests from there, when the launch is forgotten. There is no answer for
+/// wheels of so many legs that it is not. A wheel without any noise is followed once,
 /// and one that rolls on then never rests. Cost: 15 to 60 us a collision.
 RigidBodyCheck rigid_body_check(const Setting& setting, const RigidBodyOptions& options);
 

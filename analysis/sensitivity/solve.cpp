@@ -59,7 +59,8 @@ Answered answered(const Metastability& found, const Target& target, const StudyO
   const bool rarer_than_draws = found.status == Status::rest_unresolved;
   if (target.of == Target::Of::steps)
     return {rarer_than_draws ? Estimate{infinite, infinite, infinite} : found.steps.from_start, ""};
-  return {rarer_than_draws ? Estimate{1, 1, 1} : probability(*found.steps.reach_end, found.steps.from_start), ""};
+  if (rarer_than_draws) return {{1, 1, 1}, ""};
+  return {found.steps.reach_end_interval.value_or(probability(*found.steps.reach_end, found.steps.from_start)), ""};
 }
 
 // A coarse answer so far from the target that a fine one lies on the same side of it?
@@ -230,6 +231,7 @@ Solution solve(const Setting& setting, Parameter parameter, const Target& target
     throw std::invalid_argument("reach: the ramp has no end");
   StudyOptions brief = study_options;
   brief.brief = true;
+  brief.reach_end_interval = target.of != Target::Of::steps;
   // On one slope one table of landings serves all points.
   if (parameter != Parameter::slope) {
     StudyOptions first = study_options;

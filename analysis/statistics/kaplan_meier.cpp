@@ -88,6 +88,11 @@ ExpectedSteps expected_steps(std::span<const ObservedSteps> trials, int steady_f
   const bool steady = result.steady_collisions > 0;
   const Restricted seen = restricted(trials, steady ? transient : points.back().steps);
   const double d = result.steady_rests, m = result.steady_collisions;
+  // Of Jeffreys' distribution the bound after no rest at all would be missed by up to 14 % of experiments, not 5 %; by
+  // this one, whose bound is the exact one (0.05 of such experiments see no rest), it is not.
+  const boost::math::beta_distribution<> rate = d > 0 || !steady
+                                                    ? boost::math::beta_distribution<>(d + 0.5, m - d + 0.5)
+                                                    : boost::math::beta_distribution<>(1, m);
   std::vector<double> replicates;
   std::vector<ObservedSteps> resampled(trials.size());
   for (std::uint64_t r = 0; r < resamples; ++r) {
@@ -96,9 +101,7 @@ ExpectedSteps expected_steps(std::span<const ObservedSteps> trials, int steady_f
           trials[static_cast<std::size_t>(uniform_at(seed, r, t + 1, stream) * static_cast<double>(trials.size()))];
     const Restricted one = restricted(resampled, steady ? transient : points.back().steps);
     double steps = one.area;
-    if (steady && one.survival > 0)
-      steps += one.survival / boost::math::quantile(boost::math::beta_distribution<>(d + 0.5, m - d + 0.5),
-                                                    uniform_at(seed, r, 0, stream));
+    if (steady && one.survival > 0) steps += one.survival / boost::math::quantile(rate, uniform_at(seed, r, 0, stream));
     replicates.push_back(steps);
   }
   std::sort(replicates.begin(), replicates.end());

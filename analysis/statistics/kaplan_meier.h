@@ -34,7 +34,7 @@ std::vector<SurvivalPoint> kaplan_meier(std::span<const ObservedSteps> trials);
 struct ExpectedSteps {
   /// The area under S up to `steady_from` - 1 collisions, and beyond it S / rate: the failure rate is taken as
   /// constant in the steady state. Its 95 % come from trials resampled for the first part, the Jeffreys distribution of
-  /// the rate for the second.
+  /// the rate for the second; after no rest at all the one whose bound is exact.
   Estimate from_start;
   Estimate failure_rate;  ///< per steady collision; exact (Clopper and Pearson) 95 % interval
   int steady_rests = 0;   ///< behind failure_rate

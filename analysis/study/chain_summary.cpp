@@ -233,6 +233,30 @@ ChainSteps chain_steps(const markov::AnyReturnMap& map, const markov::StateSpace
   return steps;
 }
 
+std::optional<double> asked_reach_end(const Problem& problem, const SolvedChain& solved, const markov::Launch& launch,
+                                      const StudyOptions& options) {
+  if (!options.reach_end_interval || !problem.last_event) return std::nullopt;
+  return markov::Survival(solved.solver, solved.quasi, launch).at(*problem.last_event);
+}
+
+double followed_survival(const markov::SampledChain& sampled, int events) {
+  std::vector<double> alive = sampled.launch.after;
+  const int most = std::min(events, static_cast<int>(most_forward));
+  for (int n = 1; n < most; ++n) alive = markov::apply_left(sampled.chain, alive);
+  return std::clamp(std::accumulate(alive.begin(), alive.end(), 0.0), 0.0, 1.0);
+}
+
+SurvivalScale::SurvivalScale(std::span<const double> probabilities) {
+  by_hazard_ = std::ranges::all_of(probabilities, [](double p) { return p > 0 && p < 1; });
+}
+
+double SurvivalScale::at(double p) const { return by_hazard_ ? std::log(-std::log(p)) : p; }
+
+Estimate SurvivalScale::interval(double p, double half) const {
+  if (!by_hazard_) return {p, std::max(0.0, p - half), std::min(1.0, p + half)};
+  return {p, std::pow(p, std::exp(half)), std::pow(p, std::exp(-half))};
+}
+
 void summarize(const Problem& problem, const markov::StateSpace& space, std::span<const double> states,
                const markov::SampledChain& sampled, const SolvedChain& solved, const StudyOptions& options,
                Metastability& result) {

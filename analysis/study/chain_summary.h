@@ -2,6 +2,7 @@
 // Reads off one chain the numbers of a study that need no replicates.
 
 #include <cstdint>
+#include <optional>
 #include <span>
 #include <string>
 #include <vector>
@@ -32,12 +33,33 @@ struct ChainSteps {
   double from_start = 0;
   double from_quasi_stationary = 0;
   double worst_start = 0;
+  std::optional<double> reach_end;  ///< as StepsToRest::reach_end, where it is asked for
 };
 
 /// Finds the expected steps of a sampled chain. The worst start is the lowest state a survivor can have, at the phase
 /// where that is worst; its landings are drawn with `draws` (each at most 16384, the first four).
 ChainSteps chain_steps(const markov::AnyReturnMap& map, const markov::StateSpace& space, const SolvedChain& solved,
                        const std::vector<markov::DrawOptions>& draws);
+
+/// Returns StepsToRest::reach_end of a chain where a study is asked for its interval; nothing otherwise.
+std::optional<double> asked_reach_end(const Problem& problem, const SolvedChain& solved, const markov::Launch& launch,
+                                      const StudyOptions& options);
+
+/// Returns the probability of surviving so many events (no more than 100000 are followed), forwards: of any chain.
+double followed_survival(const markov::SampledChain& sampled, int events);
+
+/// A scale on which probabilities of survival have intervals: ln(-ln p), on which survival of many steps moves as
+/// ln(expected steps) does; or p itself, where one of the probabilities is 0 or 1.
+class SurvivalScale {
+ public:
+  explicit SurvivalScale(std::span<const double> probabilities);
+  double at(double p) const;
+  /// Returns p with the interval that reaches to `half` on either side on this scale.
+  Estimate interval(double p, double half) const;
+
+ private:
+  bool by_hazard_ = true;
+};
 
 /// The levels of all quantiles.
 inline constexpr double quantile_levels[] = {0.05, 0.25, 0.5, 0.75, 0.95};

@@ -179,6 +179,17 @@ Metastability estimates(const Refinement& levels, double launch_error, const Stu
   return result;
 }
 
+// Returns the probability of surviving the course, with what the last refinement and the launch leave open.
+Estimate reach_end(const Problem& problem, const Level& fine, const Level& coarse, double rows_error,
+                   double launch_error, const StudyOptions& options) {
+  const auto told = [&](const Level& one) {
+    return std::clamp(*asked_reach_end(problem, one.solved, one.chain.launch, options), 0.0, 1.0);
+  };
+  const double both[] = {told(fine), told(coarse)};
+  const SurvivalScale scale(both);
+  return scale.interval(both[0], rows_error + launch_error + safety * std::abs(scale.at(both[0]) - scale.at(both[1])));
+}
+
 }  // namespace
 
 Metastability integrated_study(const Problem& problem, const StudyOptions& options) {
@@ -203,6 +214,8 @@ Metastability integrated_study(const Problem& problem, const StudyOptions& optio
   tell(0.96, "summary");
   const std::span<const double> states = fine.space.states();
   summarize(problem, fine.space.cells(), states, fine.chain, fine.solved, options, result);
+  if (options.reach_end_interval && problem.last_event)
+    result.steps.reach_end_interval = reach_end(problem, fine, coarse, rows.error(), launch_error, options);
   if (!options.brief) compare_survivors(problem, coarse.space.states(), coarse.chain, coarse.solved, result);
   add_landing_error(result, landing_error(problem, result.phases, states, fine.chain, fine.solved, options),
                     options.tolerance);

@@ -180,6 +180,7 @@ void add_landing_error(Metastability& result, const LandingError& error, double 
     steps->lower = std::min(steps->value, std::max(1.0, steps->lower * std::exp(-less)));
     steps->upper *= std::exp(more);
   }
+  result.steps.widen_reach_end(less, more);
   Estimate& rate = result.spectrum.failure_rate;
   rate.lower *= std::exp(-more);
   rate.upper = std::max(rate.value, std::min(1.0, rate.upper * std::exp(less)));

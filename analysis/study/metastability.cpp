@@ -102,11 +102,14 @@ class Study {
               markov::discretize(problem_.map, space, problem_.launch, {.draws = draws, .threads = inner}));
         for (std::size_t s = 0; s < sizes; ++s) {
           if (pilot.beside) chains[k][s] = without_unreached(std::move(chains[k][s]));
-          if (rests(chains[k][s]))
-            steps[s][first + k] = chain_steps(problem_.map, ladder.spaces[s],
-                                              SolvedChain(chains[k][s], pilot.regime(ladder.spaces[s])), {draws});
-          else
-            steps[s][first + k].from_start = infinite;
+          ChainSteps& one = steps[s][first + k];
+          if (!rests(chains[k][s])) {
+            one.from_start = infinite;
+            continue;
+          }
+          const SolvedChain solved(chains[k][s], pilot.regime(ladder.spaces[s]));
+          one = chain_steps(problem_.map, ladder.spaces[s], solved, {draws});
+          one.reach_end = asked_reach_end(problem_, solved, chains[k][s].launch, options_);
         }
       });
       for (std::vector<markov::SampledChain>& one : chains)
@@ -195,6 +198,7 @@ class Study {
       std::swap(before_finest, finest);
       finest.emplace(ladder.pooled[s], pilot.regime(ladder.spaces[s]));
       pooled.push_back(chain_steps(problem_.map, ladder.spaces[s], *finest, draws));
+      pooled.back().reach_end = asked_reach_end(problem_, *finest, ladder.pooled[s].launch, options_);
     }
 
     Metastability result;
@@ -226,7 +230,23 @@ class Study {
     for (std::size_t r = 0; r < ladder.replicate[2].size(); ++r)
       result.steps.replicate_logs.push_back(
           extrapolate(std::log(ladder.replicate[2][r].from_start), std::log(ladder.replicate[1][r].from_start)));
+    if (pooled.back().reach_end) result.steps.reach_end_interval = reach_end(pooled, ladder.replicate.back());
     return {std::move(result), *std::move(before_finest), *std::move(finest)};
+  }
+
+  // Joins what the replicates on the finest cells leave open and what cells do, the step to the extrapolated value
+  // included: the probability is read off the finest chain as it is.
+  static Estimate reach_end(const std::vector<ChainSteps>& pooled, const std::vector<ChainSteps>& replicates) {
+    std::vector<double> all;
+    for (const std::vector<ChainSteps>* some : {&pooled, &replicates})
+      for (const ChainSteps& one : *some) all.push_back(*one.reach_end);
+    const SurvivalScale scale(all);
+    const auto at = [&](std::size_t s) { return scale.at(*pooled[s].reach_end); };
+    const double fine = at(2), extrapolated = extrapolate(fine, at(1)), before = extrapolate(at(1), at(0));
+    std::vector<double> sampled;
+    for (const ChainSteps& one : replicates) sampled.push_back(scale.at(*one.reach_end));
+    const double cells = std::abs(extrapolated - fine) + std::abs(extrapolated - before) / change_over_error;
+    return scale.interval(*pooled[2].reach_end, std::hypot(cells, t_interval(sampled).half_width));
   }
 
   // Answers where some states never come to rest: there is no first passage, but a stationary regime.
@@ -252,6 +272,8 @@ class Study {
       }
       tell(0.7, "summary");
       summarize_endless(problem_, space, sampled, options_, result);
+      if (options_.reach_end_interval && problem_.last_event)
+        result.steps.reach_end_interval = endless_reach_end(result);
       break;
     }
     if (std::isfinite(result.steps.from_start.value)) {
@@ -262,6 +284,27 @@ class Study {
             "the metastable regime is of wheels that never rest: fewer than 1e-15 of the launches come to such speeds";
     }
     return result;
+  }
+
+  // Says what other draws leave open of the probability that one set of them gives, and what wider cells make of it.
+  Estimate endless_reach_end(const Metastability& result) const {
+    const auto told = [&](std::size_t cells, int replicate) {
+      const markov::StateSpace space = markov::covering_space(problem_.map, problem_.launch, cells, options_.seed);
+      const auto draws = draw_options(options_, result.samples, replicate);
+      return followed_survival(
+          markov::discretize(problem_.map, space, problem_.launch, {.draws = draws, .threads = options_.threads}),
+          *problem_.last_event);
+    };
+    const double wider = told(result.cells / 2, 0);
+    std::vector<double> replicates{*result.steps.reach_end};
+    for (int r = 1; r < options_.replicates; ++r) replicates.push_back(told(result.cells, r));
+    std::vector<double> all = replicates;
+    all.push_back(wider);
+    const SurvivalScale scale(all);
+    std::vector<double> sampled;
+    for (const double p : replicates) sampled.push_back(scale.at(p));
+    const double of_one = t_interval(sampled).half_width * std::sqrt(static_cast<double>(sampled.size()));
+    return scale.interval(replicates.front(), std::hypot(scale.at(wider) - sampled.front(), of_one));
   }
 
   Metastability unresolved() const {
@@ -425,6 +468,12 @@ RestThresholds rest_thresholds(const Metastability& study) {
   return thresholds;
 }
 
+void StepsToRest::widen_reach_end(double less, double more) {
+  if (!reach_end_interval) return;
+  reach_end_interval->lower = std::pow(reach_end_interval->lower, std::exp(less));
+  reach_end_interval->upper = std::pow(reach_end_interval->upper, std::exp(-more));
+}
+
 std::optional<double> Accumulated::quantile(double level) const {
   for (const Quantile& one : quantiles)
     if (one.level == level) return one.value;
@@ -438,7 +487,8 @@ std::string_view method_name(Method method) {
 Method method_from_name(std::string_view name) {
   for (const Method method : {Method::sampled, Method::integrated})
     if (name == method_name(method)) return method;
-  throw std::invalid_argument(fmt::format("method: '{}' is neither 'sampled' nor 'integrated', which wheels have", name));
+  throw std::invalid_argument(
+      fmt::format("method: '{}' is neither 'sampled' nor 'integrated', which wheels have", name));
 }
 
 std::string status_text(Status status) {

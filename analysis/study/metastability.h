@@ -54,6 +54,7 @@ struct StudyOptions {
   double mixing_distance = 0.05;  ///< total variation distance that counts as mixed
   int eigenvalues = 6;            ///< how many moduli to report
   bool brief = false;             ///< leave out seconds, metres, spectrum, mixing and violated assumptions (sweeps do)
+  bool reach_end_interval = false;         ///< work out StepsToRest::reach_end_interval too
   std::size_t largest_cells = 1024;        ///< refinement stops here
   std::size_t largest_samples = 1u << 18;  ///< and here
   /// It is called now and then, from any thread, with the work done so far in [0, 1] and what is being done, and may
@@ -126,6 +127,11 @@ struct StepsToRest {
   std::optional<Accumulated> metres;   ///< from the first foot to the last
   std::vector<double> survival;     ///< P(steps > n), n = 0, 1, ...: 64 values, or to the course's end (10000 at most)
   std::optional<double> reach_end;  ///< probability of surviving the last event of the course
+  /// Holds reach_end with its 95 % interval, from chains and trials as from_start's; nothing where it was not asked for
+  /// or launches were followed without noise.
+  std::optional<Estimate> reach_end_interval;
+  /// Widens that interval as if the logarithm of the expected steps might be so much less, and more.
+  void widen_reach_end(double less, double more);
   /// The state below which a launch may come to rest, when faster ones never do.
   std::optional<double> safe_state;
 };

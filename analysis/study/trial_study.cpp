@@ -136,6 +136,10 @@ std::optional<Metastability> trial_study(const Problem& problem, const StudyOpti
   StepShares shares;
   for (const double one : steps) shares[one] += 1 / static_cast<double>(steps.size());
   fill_steps(problem, shares, result);
+  if (options.reach_end_interval && problem.last_event)
+    result.steps.reach_end_interval = exact_share(
+        static_cast<std::size_t>(std::ranges::count_if(steps, [&](double one) { return one > *problem.last_event; })),
+        steps.size());
   // Trials tell nothing of the regime: any rate is possible.
   result.spectrum.failure_rate = {1 / found.mean, 0, 1};
   result.steps.from_quasi_stationary = {found.mean, 1, infinite};
@@ -146,11 +150,17 @@ std::optional<Metastability> trial_study(const Problem& problem, const StudyOpti
 }
 
 void require_followed(const Problem& problem, const Metastability& study, const StudyOptions& options) {
-  constexpr double much = 0.1;
+  constexpr double much = 0.1, beyond_first_order = 1;
   constexpr std::size_t launches = 4000;
   const Estimate& memory = study.steps.memory;
   const double moved = std::max({study.steps.landing_error, std::abs(memory.lower), std::abs(memory.upper)});
   if (!problem.follow || !(moved > much)) return;
+  if (moved > beyond_first_order)
+    throw StatesTooCoarse(fmt::format(
+        "to first order, landings read from a table may move the expected steps by {:.2g}, and what a state at "
+        "touch-down leaves out moves them by {:.2g} to {:.2g}, such as feet that still hop or slide: from 1 on that "
+        "bounds nothing; simulate follows trials",
+        study.steps.landing_error, memory.lower, memory.upper));
   const std::size_t most = study.steps.survival.size();
   const auto [mean, error] = mean_of(follow_trials(problem, options, 0, launches, most, false, before_trials).steps);
   const double expected = std::accumulate(study.steps.survival.begin(), study.steps.survival.end(), 0.0);
@@ -210,8 +220,10 @@ Metastability held_against_trials(const Problem& problem, Metastability study, c
       "{:.5g} (standard error {:.2g}): its cells are too wide for this noise (in the interval)",
       options.tolerance, most, expected, checked_trials, found.mean, error);
   Estimate& steps = study.steps.from_start;
+  const Estimate before = steps;
   steps.lower = std::max(1.0, std::min(steps.lower, steps.value * (found.mean - slack) / expected));
   steps.upper = std::max(steps.upper, steps.value * (found.mean + slack) / expected);
+  study.steps.widen_reach_end(std::log(before.lower / steps.lower), std::log(steps.upper / before.upper));
   return study;
 }
 

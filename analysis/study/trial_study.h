@@ -19,7 +19,8 @@ std::optional<Metastability> trial_study(const Problem& problem, const StudyOpti
 /// Checks a study against events that are followed one by one, if `problem` can follow them: 4000 launches, no further
 /// than survival is known. It does so where the errors of a table of landings, or of what states leave out, may move
 /// the expected steps by a tenth or more, which an estimate of first order may get wrong. @throws StatesTooCoarse with
-/// both numbers if what is followed lies outside the interval of the study by more than 4 standard errors
+/// both numbers if what is followed lies outside the interval of the study by more than 4 standard errors, and without
+/// following any where they may move the logarithm of the expected steps by 1
 void require_followed(const Problem& problem, const Metastability& study, const StudyOptions& options);
 
 /// Holds the chain's answer against drawn trials. Cells and nodes smear noise that is much narrower than they are, and

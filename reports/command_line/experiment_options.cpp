@@ -105,10 +105,9 @@ Command coast_down() {
         o.add_flag("linear", "Fit a loss proportional to omega even where it is within five standard errors of none");
         o.add("rotor-inertia", "KGM2", "", "Of the drum [kg m^2]: turns losses into torques",
               dynamics::range::rotor_inertia);
-        o.add_flag(
-            "accept-defects",
-            "Take a log of which more than a tenth of the revolutions is left out, or a loss that is not positive "
-            "over its speeds: every verdict will repeat it");
+        o.add_flag("accept-defects",
+                   "Take a log of which more than a tenth of the revolutions is left out, a loss that is not positive "
+                   "over its speeds, or a top speed beyond 3000 rad/s: every verdict will repeat it");
         o.add("out", "DIR", "", "Folder to create (must not hold an experiment yet)");
         o.add_json();
       },
@@ -426,9 +425,9 @@ DescribeRequest describe_request(const Options& o, const std::string& line) {
 }
 
 void declare_diagnose(Options& o) {
-  o.add_place(
-      "DIR",
-      "Experiment folder: of a wheel (its [contact] names the law published, coulomb, plastic or settled), a drum or walks");
+  o.add_place("DIR",
+              "Experiment folder: of a wheel (its [contact] names the law published, coulomb, plastic or settled), a "
+              "drum or walks");
   o.add("catalogue", "FILE|ID,ID,...", "",
         "Effects to consider, in a list or a file with one a line (default: all of 'metastable effects'); a pair, "
         "trial_drift+bounce, is tried in any case, and a list of pairs alone extends the whole catalogue");

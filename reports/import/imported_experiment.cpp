@@ -36,15 +36,20 @@ using TrialKey = std::pair<std::string, std::string>;  // condition, trial
 
 TrialKey key_of(const ImportedRow& row) { return {row.condition.value_or(""), row.trial.value_or("")}; }
 
+// Says whether a trial is told: a table that lacks it may say so in a word.
+bool is_trial(const std::optional<std::string>& text) {
+  return text && *text != "NaN" && *text != "nan" && *text != "NAN" && *text != "NA";
+}
+
 // Gives every row the number of its trial, as the file has it or in the order of the rows.
 std::vector<long> trial_numbers(const std::vector<ImportedRow>& rows, bool renumber, Defects& defects) {
   std::vector<long> numbers;
   std::map<TrialKey, long> given;
   std::map<long, std::string> condition_of;
   for (const ImportedRow& row : rows) {
-    if (!row.trial) {
+    if (!is_trial(row.trial)) {
       defects.add_row(row.place, "trial: is not told");
-      if (std::ranges::none_of(rows, [](const ImportedRow& one) { return one.trial.has_value(); })) return {};
+      if (std::ranges::none_of(rows, [](const ImportedRow& one) { return is_trial(one.trial); })) return {};
       numbers.push_back(0);
       continue;
     }
@@ -192,10 +197,19 @@ std::string steps_csv(const std::vector<ImportedRow>& rows, const std::vector<lo
   return csv;
 }
 
-// Counts the collisions of each trial where the file does not.
-void count_collisions(std::vector<ImportedRow>& rows, const std::vector<long>& numbers, int first) {
+// Counts the collisions of each trial where the file does not: its rows have to stand together. Rows that are sorted
+// by something else, a file pasted behind itself and two files that use the same numbers would make long trials.
+void count_collisions(std::vector<ImportedRow>& rows, const std::vector<long>& numbers, int first, Defects& defects) {
   std::map<long, int> so_far;
-  for (std::size_t i = 0; i < rows.size(); ++i) rows[i].collision = first + so_far[numbers[i]]++;
+  for (std::size_t i = 0; i < rows.size(); ++i) {
+    int& count = so_far[numbers[i]];
+    if (count > 0 && numbers[i] != numbers[i - 1])
+      defects.add_row(rows[i].place,
+                      fmt::format("trial: {} goes on behind rows of another trial, and no column tells in which order: "
+                                  "put the rows of a trial together, or map the column that counts them",
+                                  shown_text(rows[i].trial.value_or(""))));
+    rows[i].collision = first + count++;
+  }
 }
 
 // Counts conditions, trials and rows.
@@ -243,14 +257,16 @@ Imported imported_experiment(const std::string& file, std::vector<ImportedRow> r
     for (ImportedRow& row : rows) row.trial = "1";
     imported.assumed.push_back("all frames are of one trial");
   }
-  if (walks) put_in_order(rows);
+  // Rows without a number of the step are in order, or refused below.
+  if (walks && told(&ImportedRow::collision)) put_in_order(rows);
   const std::vector<long> numbers = trial_numbers(rows, options.number_trials, defects);
   defects.check();
   if (options.number_trials)
     imported.assumed.push_back(
         "trials are numbered in the order of their first rows, taken as the order they were run");
   if (!angles && !told(&ImportedRow::collision)) {
-    count_collisions(rows, numbers, options.first_collision);
+    count_collisions(rows, numbers, options.first_collision, defects);
+    defects.check();
     imported.assumed.push_back(fmt::format("{} are counted in the order of the rows", walks ? "steps" : "collisions"));
   }
   const Outcomes outcomes = outcomes_of(rows, numbers, options, defects);

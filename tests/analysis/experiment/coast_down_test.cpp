@@ -79,6 +79,10 @@ TEST(CoastDown, ObjectsToLogsThatAreNoBasis) {
   EXPECT_EQ(objection(run_of(times), {0.15, -0.05, 0.002, 0.02}),
             ": the nominal loss falls to -0.162 rad^2/s^2 a revolution between 5 and 30.8 rad/s, and a drum that "
             "coasts down loses more than nothing");
+  CoastDownRun in_milliseconds = run_of(times);
+  in_milliseconds.top *= 1000;
+  EXPECT_EQ(objection(in_milliseconds, {0.15, 0, 0.002, 0.02}),
+            ": a top speed of 3.08e+04 rad/s, where a drum turns at 3000 at most: is time_us in microseconds?");
   for (std::size_t k = 400; k > 200; k -= 8) times.erase(times.begin() + static_cast<std::ptrdiff_t>(k));
   EXPECT_NE(objection(run_of(times), {0.15, 0, 0.002, 0.02}).find("revolutions left out for ticks"), std::string::npos);
 }

@@ -85,6 +85,25 @@ TEST(Solve, ReachesTheRampsEndAsTheStudySays) {
   EXPECT_FALSE(found.found[0].rising);
 }
 
+// Ten million trials of these formulas in NumPy survive three steps 51.833 % of the time (standard error 0.016).
+TEST(Solve, HasIntervalsOfSurvivalThatHoldWhatTrialsDo) {
+  const double simulated = 0.51833, error = 0.00016;
+  Problem problem = paper_setting(7.02, true).problem();
+  problem.last_event = 3;
+  int held = 0;
+  constexpr int seeds = 10;
+  for (std::uint64_t seed = 1; seed <= seeds; ++seed) {
+    const Metastability found =
+        study(problem, {.cells = 64, .samples = 256, .seed = seed, .brief = true, .reach_end_interval = true});
+    ASSERT_TRUE(found.steps.reach_end_interval);
+    const Estimate& survival = *found.steps.reach_end_interval;
+    EXPECT_EQ(survival.value, *found.steps.reach_end);
+    EXPECT_LT(survival.upper - survival.lower, 0.03);
+    held += survival.lower - 2 * error < simulated && simulated < survival.upper + 2 * error;
+  }
+  EXPECT_GE(held, seeds - 2);
+}
+
 // `metastable steps --slope 8.214 --legs 0.1519 --friction 0.3,0.05 --json -` has a failure rate r of 1.054e-4 from the
 // regime that it starts in, and (1 - r)^1000 = 0.9.
 TEST(Solve, FindsTheSlopeThatNinetyPerCentSurvive) {

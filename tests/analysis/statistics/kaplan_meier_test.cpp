@@ -69,6 +69,13 @@ TEST(KaplanMeier, SaysWhereThereIsOnlyABound) {
   EXPECT_THROW(kaplan_meier(std::vector<ObservedSteps>{{0, true}}), std::invalid_argument);
 }
 
+// At a rate of 2 in 200 collisions e^-2 = 13 % of experiments see no rest, and their bound of 95 % has to hold: 12
+// steps and one over the rate, of which 0.05 of experiments see none.
+TEST(KaplanMeier, BoundWithoutARestIsExact) {
+  const double exact = 12 + 1 / (1 - std::pow(0.05, 1.0 / 200));
+  EXPECT_NEAR(expected_steps(std::vector<ObservedSteps>(50, {16, false}), 13, 1).from_start.lower, exact, 0.04 * exact);
+}
+
 // The stand-in's wheel takes at 7.02 deg 194.95 expected steps (`metastable steps`, interval 194.63 to 195.27).
 TEST(KaplanMeier, IntervalsCoverTheChainsExpectedSteps) {
   Setting setting = stand_in_setting();

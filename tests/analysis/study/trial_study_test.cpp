@@ -31,6 +31,11 @@ TEST(TrialStudy, CoarseStatesAreHeldAgainstWhatIsFollowed) {
     followed = static_cast<std::uint64_t>(factor * expected);
     EXPECT_THROW(require_followed(problem, study, options), StatesTooCoarse) << factor;
   }
+  // An error beyond first order bounds nothing, whatever the trials take.
+  followed = static_cast<std::uint64_t>(expected);
+  study.steps.landing_error = 3.5;
+  EXPECT_THROW(require_followed(problem, study, options), StatesTooCoarse);
+  study.steps.landing_error = 0;
   study.steps.memory = {0.05, 0.01, 0.09};
   EXPECT_NO_THROW(require_followed(problem, study, options));
 }

@@ -95,6 +95,21 @@ TEST_F(Import, NumbersNamesOfTrialsAndStatesTheWheelByOptions) {
                  "--friction");
 }
 
+TEST_F(Import, RefusesRowsOfATrialThatAreApartAndUncounted) {
+  const std::string apart =
+      ": trial: '1' goes on behind rows of another trial, and no column tells in which order: put the rows of a trial "
+      "together, or map the column that counts them";
+  const std::string twice = file("twice.csv", "trial,w,condition\n1,5.1,fast\n1,4.9,fast\n2,5,fast\n1,5.1,fast\n");
+  expect_refused(import({twice, "--columns", "omega_minus=w[rad/s]"}), twice + ":5" + apart);
+  const std::string walks = file("walks.csv", "trial,a,r\n1,0.2,-1\n2,0.2,-1\n1,0.2,-1\n");
+  expect_refused(import({walks, "--columns", "half_angle=a[rad],stance_rate=r[rad/s]", "--walker", "compass", "--slope",
+                         "3", "--slope-sd", "0.3"}),
+                 walks + ":4" + apart);
+  const std::string nameless = file("nameless.csv", "run,w,condition\nA,5.1,fast\nNaN,5.1,fast\n");
+  expect_refused(import({nameless, "--columns", "trial=run,omega_minus=w[rad/s]", "--number-trials"}),
+                 nameless + ":3: trial: is not told");
+}
+
 TEST_F(Import, NamesWhatIsMissingOrAmbiguous) {
   const std::string csv = file("a.csv", "trial,w,w2,leg\n1,5.1,5,0\n1,4.9,5,2\n2,300,5,0\n2,x,5,1\n");
   const auto columns = [&](const std::string& map) { return import({csv, "--columns", map}); };
