@@ -12,6 +12,8 @@ namespace {
 
 constexpr double at_the_end = 1e-6;  // of the range
 constexpr double inwards = 1e-3;     // of the range, to find the reported number that a parameter moves
+// A machine states the largest value of this number.
+constexpr std::string_view most_wild_reported = "wild_share";
 
 enum class End { none, lower, upper };
 
@@ -82,10 +84,16 @@ std::vector<AtBound> values_at_bound(const TransitionModel& model, const Fit& fi
 }
 
 std::string at_bound_in_words(const AtBound& one) {
+  const std::string which =
+      one.of.empty() ? "The fitted " + one.parameter : fmt::format("The {} of {}", one.parameter, one.of);
+  if (one.of.empty() && one.upper && one.parameter == most_wild_reported)
+    return fmt::format(
+        "{} stands at the largest that most_wild allows, {:.4g}: more rows may be wild (spikes, missed events), and "
+        "these pass for outliers, for memory or for noise of a sensor; diagnose with a larger most_wild, too.",
+        which, one.value);
   return fmt::format(
-      "{}{} stands at the {} bound of its range, {:.4g}: its interval has one side only, and the truth may lie beyond.",
-      one.of.empty() ? "The fitted " : "The " + one.of + "'s ", one.parameter, one.upper ? "upper" : "lower",
-      one.value);
+      "{} stands at the {} bound of its range, {:.4g}: its interval has one side only, and the truth may lie beyond.",
+      which, one.upper ? "upper" : "lower", one.value);
 }
 
 }  // namespace metastable::analysis

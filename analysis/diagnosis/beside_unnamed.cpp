@@ -73,6 +73,27 @@ std::vector<Fit> without_each(const TransitionModel& model, const Fit& joined, c
   return without;
 }
 
+// Returns by how much a variation, the last term of `joined`, is likelier in the place of several effects than of one
+// [ln]: each effect beside it that says nothing there is one more in the hypothesis, at Rules::pair_prior, and one less
+// with the variation.
+double log_odds_of_fewer(const TransitionModel& model, Fit joined, const Effort& effort,
+                         const DiagnosisOptions& options, const std::function<void()>& beat) {
+  double saved = 0;
+  while (joined.terms.size() > 1) {
+    std::vector<Fit> without = without_each(model, joined, effort, options.threads, beat);
+    std::vector<double> log_odds;
+    for (std::size_t k = 0; k < without.size(); ++k)
+      log_odds.push_back(
+          std::log(options.rules.pair_prior) +
+          evidence_of_term(*joined.terms[k].candidate, 2 * (joined.penalised - without[k].penalised), options.rules));
+    const auto least = std::ranges::min_element(log_odds);
+    if (*least >= 0) break;
+    saved -= *least;
+    joined = std::move(without[static_cast<std::size_t>(least - log_odds.begin())]);
+  }
+  return saved;
+}
+
 }  // namespace
 
 std::optional<InPlace> varies_without_name(const TransitionModel& model, const std::vector<LeftInFacet>& alone) {
@@ -128,12 +149,17 @@ std::optional<InPlace> in_place_of_effects(const TransitionModel& model, const C
     }
   }
   if (!found) return {};
-  if (heartbeat) heartbeat();
-  const Fit with = fit_one_more(model, effort_for(model, recalibrated), *others, leader, true);
+  const std::function<void()> beat = markov::one_at_a_time(heartbeat);
+  beat();
+  const Effort effort = effort_for(model, recalibrated);
+  const Fit with = fit_one_more(model, effort, *others, leader, true);
+  const double least = -std::log(options.rules.most_odds_of_none());  // The name stays while it may be as likely.
   found->gain = std::max(0.0, 2 * (with.penalised - others->penalised));
-  found->odds = std::exp(std::min(std::log(largest_odds_in_place),
-                                  prior + evidence_of(leader, found->gain, options.rules) - own_of_leader));
-  if (!(found->odds > 1 / options.rules.most_odds_of_none())) return {};  // The name stays while it may be as likely.
+  double log_odds = prior + evidence_of(leader, found->gain, options.rules) - own_of_leader;
+  if (log_odds > std::log(least_odds) && log_odds <= least)
+    log_odds += log_odds_of_fewer(model, with, effort, options, beat);
+  if (!(log_odds > least)) return {};
+  found->odds = std::exp(std::min(std::log(largest_odds_in_place), log_odds));
   return found;
 }
 

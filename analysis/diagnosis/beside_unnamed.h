@@ -34,7 +34,7 @@ const Variation* same_variation(const TransitionModel& model, const RankedCause&
 
 /// Finds the variation that fits best in the place of one effect of a hypothesis of several, the others kept. Of one
 /// effect the variations at the recalibrated model say so. Nothing where none is clearly likelier than the
-/// effect, by 1 / Rules::most_odds_of_none().
+/// effect, by 1 / Rules::most_odds_of_none(), or than that effect and others that say nothing beside the variation.
 /// @param without  fits of the hypothesis without each effect  @param facets  in how many something may act
 std::optional<InPlace> in_place_of_effects(const TransitionModel& model, const CauseRanking& ranking,
                                            const RankedCause& best, const Fit& recalibrated, FitsWithout& without,

@@ -152,10 +152,10 @@ std::vector<std::string> notes_on_roughness(const Fitted& fitted, const Diagnosi
         recalibrated.reason, recalibrated.promised, 2 * recalibrated.promised));
   if (!fitted.ranking.scan.trials_suffice)
     notes.push_back(fmt::format(
-        "{} {} of {:.2g} transitions: chance levels come from the model's information alone; from {} trials "
+        "{} {} of {} transitions: chance levels come from the model's information alone; from {} trials "
         "of {} transitions on, from the trials' own scatter",
         data.trials, data.trials == 1 ? "trial" : "trials",
-        static_cast<double>(data.events) / static_cast<double>(std::max<std::size_t>(1, data.trials)),
+        std::lround(static_cast<double>(data.events) / static_cast<double>(std::max<std::size_t>(1, data.trials))),
         Rules::enough_trials, Rules::enough_transitions));
   return notes;
 }

@@ -17,6 +17,7 @@ constexpr std::size_t most_parameters = 3;  // of an effect that a sentence name
 constexpr double shown_level = 0.05;        // of a cell, for a sentence
 constexpr double worth_saying = 3;          // evidence in a facet
 constexpr double worth_naming = 10;         // gain of the nearest effect where none explains the gap
+constexpr std::size_t most_pieces = 10;     // So many pieces of a log that is cut put two into each of five folds.
 
 std::string with_parameters(const Cause& cause) {
   std::string text;
@@ -235,6 +236,14 @@ void say_verdict(std::vector<std::string>& s, const Diagnosis& d) {
   }
 }
 
+std::string where_in_words(const GapCell& cell, const std::string& step_name) {
+  const std::string at = cell.at == step_name ? fmt::format("all {}s", step_name) : cell.at;
+  if (cell.aspect == "tail") return fmt::format("the tail of {} ({:+.2g} % of them far out)", at, 100 * cell.size);
+  if (cell.aspect == "spread" && cell.unit == "correlation")
+    return fmt::format("what the {}s of a trial have in common ({:+.2g} {})", step_name, cell.size, cell.unit);
+  return fmt::format("the {} of {} ({:+.2g} {})", cell.aspect, at, cell.size, cell.unit);
+}
+
 void say_where(std::vector<std::string>& s, const Diagnosis& d) {
   const GapMap& map = d.verdict == Verdict::explained ? d.gap.recalibrated : d.gap.left;
   if (is_gap(d.verdict)) {
@@ -242,8 +251,7 @@ void say_where(std::vector<std::string>& s, const Diagnosis& d) {
       return std::abs(a.statistic) > std::abs(b.statistic);
     });
     if (largest != map.cells.end() && largest->p_adjusted < shown_level)
-      s.push_back(fmt::format("It shows most in the {} of {} ({:+.2g} {}).", largest->aspect, largest->at,
-                              largest->size, largest->unit));
+      s.push_back(fmt::format("It shows most in {}.", where_in_words(*largest, d.data.step_name)));
   }
 }
 
@@ -376,6 +384,20 @@ std::string what_it_buys(const Diagnosis& d) {
   return text;
 }
 
+// Says which trials would do where there are too few. A long one can be cut, because each row is judged given the ones
+// before it; a wheel's cannot, because its trials begin with a push.
+std::string more_trials(const Diagnosis& d, std::size_t would_do) {
+  const std::size_t rows = Rules::least_transitions_to_explain / Rules::least_trials_to_explain;
+  const std::size_t pieces = std::min(most_pieces, d.data.collisions / rows);
+  if (d.data.trials >= Rules::least_trials_to_explain || d.data.collides() || pieces < would_do)
+    return fmt::format("Run {} trials like these{}, and diagnose them together.", would_do,
+                       d.data.trials >= Rules::least_trials_to_explain ? ", or longer ones" : "");
+  return fmt::format(
+      "Run {} trials like these, or cut long ones: a trial number of its own for every {} rows makes about {}. What is "
+      "stated of a launch then has to hold where each of them begins.",
+      would_do, d.data.collisions / pieces, pieces);
+}
+
 std::string next_step(const Diagnosis& d) {
   switch (d.verdict) {
     case Verdict::no_gap:
@@ -409,8 +431,7 @@ std::string next_step(const Diagnosis& d) {
           fmt::join(names, " and "), names.size() == 1 ? "it" : "them", taken_out_of(effects));
     }
     case Verdict::unexplained:
-      if (const auto would_do = trials_to_explain(d.data))
-        return fmt::format("Run {} trials like these, or longer ones, and diagnose them together.", *would_do);
+      if (const auto would_do = trials_to_explain(d.data)) return more_trials(d, *would_do);
       return fmt::format(
           "Check the measurement first where the gap shows most (units, {}, sensor noise). If it holds, see what the "
           "cells that stay beyond chance have in common (--out DIR draws the map): no effect of the catalogue does "

@@ -5,6 +5,7 @@
 #include <set>
 #include <utility>
 
+#include "analysis/fitting/rules.h"
 #include "analysis/statistics/falling_order.h"
 
 namespace metastable::analysis {
@@ -158,7 +159,11 @@ Effort effort_for(const TransitionModel& model, const Fit& recalibrated) {
       (model.events().size() > few_events && is_far_off(recalibrated.evaluation.score)))
     return {20, 1, 1, 1, 1, 6, 2};
   if (model.events().size() > many_events) return {6, 1, 1, 2, 2, 12, 3};
-  return {};
+  Effort full;
+  // No cause is named from so few trials, one of which may be long: hardly more than single effects is worth the time.
+  if (model.trials() < Rules::least_trials_to_explain)
+    full.most_leaders = full.most_partners = 1, full.most_effects = 2;
+  return full;
 }
 
 EffectTerm term_at(const ScannedEffect& scanned, std::size_t variant) {

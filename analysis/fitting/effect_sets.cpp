@@ -166,11 +166,20 @@ void extend(const RankingProblem& problem, const SingleEffects& singles, const R
   std::ranges::move(fitted, std::back_inserter(larger));
 }
 
-// Fits all effects beside a hypothesis that promise about as much as the best one does there, and forms no set anew.
-std::vector<RankedCause> fit_alike_beside(const RankingProblem& problem, const SingleEffects& singles,
-                                          const RankedCause& base, const std::vector<RankedCause>& known) {
+// Fits effects beside a hypothesis in the place of one that was taken out: those that promise about as much as the best
+// one does there, and those that gain as much alone as the one taken out. Promises are off by shares of large gains. No
+// set is formed anew.
+std::vector<RankedCause> fit_in_place_of(const Candidate* out, const RankingProblem& problem,
+                                         const SingleEffects& singles, const RankedCause& base,
+                                         const std::vector<RankedCause>& known) {
   const EffectScan scan = scan_beside(problem, singles, base);
   std::vector<const ScannedEffect*> tries = about_as_promising(problem, singles, scan, base);
+  const auto alone = [&](const Candidate* one) { return singles.causes[problem.index_of(one)].gain; };
+  for (const ScannedEffect& effect : scan.effects)
+    if (effect.candidate != out && std::ranges::find(tries, &effect) == tries.end() &&
+        std::min(alone(effect.candidate), alone(out)) > problem.rules.told_apart &&
+        std::abs(alone(effect.candidate) - alone(out)) < problem.rules.told_apart)
+      tries.push_back(&effect);
   std::erase_if(tries, [&](const ScannedEffect* effect) {
     std::vector<EffectTerm> terms = base.terms;
     terms.push_back(term_at(*effect, effect->best));
@@ -199,7 +208,8 @@ void add_swaps(const RankingProblem& problem, const SingleEffects& singles, cons
       const auto part = find_set(parts, rest);
       if (part == parts.end() || !part->fitted() || !std::isfinite(part->evidence)) continue;
       problem.heartbeat();
-      std::ranges::move(fit_alike_beside(problem, singles, RankedCause(*part), sets), std::back_inserter(sets));
+      std::ranges::move(fit_in_place_of(out.candidate, problem, singles, RankedCause(*part), sets),
+                        std::back_inserter(sets));
     }
     bound_by_parts(problem, singles, pairs, sets);
     bound_by_parts(problem, singles, sets, sets);

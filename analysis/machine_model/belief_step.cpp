@@ -68,28 +68,35 @@ BeliefStep<Most>::BeliefStep(MachineStepper& stepper, const ScorePlan& plan, std
     if (std::ranges::find(lattice_.scores, m) == lattice_.scores.end()) straight_.push_back(m);
 }
 
-// Adds the centre, unless the lattice holds it; pairs of points along the columns of the root and along the straight
-// scores; the lattice; and for each of its scores the same pairs once more. Of those pairs the upper point has this
-// score above zero, the lower point has it below.
+// Adds the centre, unless the lattice holds it; pairs of points along the columns of the root and the straight scores;
+// the lattice; and for each of its scores the same pairs, the upper point with this score above zero, the lower below.
 template <int Most>
 void BeliefStep<Most>::add_points(const TransitionPlace& place, const Part& belief, const Matrix& root) {
   const Vector mean = belief.mean.head(size());
   const Vector still = Vector::Zero(static_cast<Eigen::Index>(stepper_.scores()));
-  const auto unit = [&](std::size_t score) {
-    return Vector(Vector::Unit(still.size(), static_cast<Eigen::Index>(score)));
-  };
   if (lattice_.scores.empty()) stepper_.add(place, mean, still);
-  const auto add_pairs = [&](const Vector& beside) {
-    for (const Eigen::Index i : used_)
-      for (const double sign : {1.0, -1.0})
-        stepper_.add(place, mean + sign * reach * root.col(i).head(size()), sign * beside);
-    for (const std::size_t s : straight_)
-      for (const double sign : {1.0, -1.0}) stepper_.add(place, mean, sign * (beside + reach * unit(s)));
-  };
-  add_pairs(still);
+  add_pairs(stepper_, place, mean, root, still, still);
   for (std::size_t p = 0; p < lattice_.points(); ++p)
     stepper_.add(place, mean, lattice_.template at<Vector>(p, stepper_.scores()));
-  for (const std::size_t score : lattice_.scores) add_pairs(beside() * unit(score));
+  for (const std::size_t score : lattice_.scores) {
+    const Vector above = beside() * Vector::Unit(still.size(), static_cast<Eigen::Index>(score));
+    add_pairs(stepper_, place, mean, root, above, -above);
+  }
+}
+
+// @param scores    of the upper point of each pair  @param mirrored  of the lower one
+template <int Most>
+void BeliefStep<Most>::add_pairs(MachineStepper& stepper, const TransitionPlace& place, const Vector& mean,
+                                 const Matrix& root, const Vector& scores, const Vector& mirrored) const {
+  for (const Eigen::Index i : used_) {
+    stepper.add(place, mean + reach * root.col(i).head(size()), scores);
+    stepper.add(place, mean - reach * root.col(i).head(size()), mirrored);
+  }
+  for (const std::size_t s : straight_) {
+    const Vector away = reach * Vector::Unit(scores.size(), static_cast<Eigen::Index>(s));
+    stepper.add(place, mean, scores + away);
+    stepper.add(place, mean, mirrored - away);
+  }
 }
 
 // Returns how many spacings of the lattice lie between zero and the score at which slopes are taken a second time. That
@@ -152,18 +159,19 @@ void BeliefStep<Most>::run_points(std::size_t trials) {
 // A slope is the central difference of a pair of points. If one of the two failed, the one-sided difference to the
 // centre replaces it.
 template <int Most>
-BeliefMatrix<Most> BeliefStep<Most>::first_differences(std::size_t at, const Vector* centre, Matrix& bend) const {
+BeliefMatrix<Most> BeliefStep<Most>::first_differences(const MachineStepper& stepper, std::size_t at,
+                                                       const Vector* centre, Matrix& bend) const {
   Matrix slope = Matrix::Zero(states(), static_cast<Eigen::Index>(pairs()));
   bend = slope;
   for (std::size_t i = 0; i < pairs(); ++i) {
-    const bool lost_up = stepper_.failed(at + 2 * i), lost_down = stepper_.failed(at + 2 * i + 1);
+    const bool lost_up = stepper.failed(at + 2 * i), lost_down = stepper.failed(at + 2 * i + 1);
     const auto column = static_cast<Eigen::Index>(i);
     if (!lost_up && !lost_down) {
-      const Vector up = stepper_.next(at + 2 * i), down = stepper_.next(at + 2 * i + 1);
+      const Vector up = stepper.next(at + 2 * i), down = stepper.next(at + 2 * i + 1);
       slope.col(column) = (up - down) / (2 * reach);
       if (centre) bend.col(column) = up + down - 2 * *centre;
     } else if (centre && lost_up != lost_down) {
-      const Vector one = stepper_.next(at + 2 * i + (lost_up ? 1 : 0));
+      const Vector one = stepper.next(at + 2 * i + (lost_up ? 1 : 0));
       slope.col(column) = (lost_up ? Vector(*centre - one) : Vector(one - *centre)) / reach;
     }
   }
@@ -194,13 +202,62 @@ BeliefMatrix<Most> BeliefStep<Most>::mixed_differences(std::size_t trial, std::s
   return change;
 }
 
+// Returns the point of the lattice nearest to scores of zero that goes on, as its neighbours along the failing score do
+// where there is such a point.
+template <int Most>
+std::optional<std::size_t> BeliefStep<Most>::point_that_goes_on(std::size_t trial) const {
+  const std::size_t n = lattice_.axis.points.size(), start = lattice_start(trial);
+  std::optional<std::size_t> found;
+  std::pair<bool, double> least;
+  for (std::size_t p = 0; p < lattice_.points(); ++p) {
+    if (stepper_.failed(start + p)) continue;
+    const bool edge =
+        (p % n > 0 && stepper_.failed(start + p - 1)) || (p % n + 1 < n && stepper_.failed(start + p + 1));
+    const std::pair away{edge, lattice_.template at<Vector>(p, stepper_.scores()).squaredNorm()};
+    if (!found || away < least) least = away, found = p;
+  }
+  return found;
+}
+
+// About a mean that fails with all scores at zero there are no slopes. They are taken about a point of the lattice that
+// goes on, for all such beliefs together.
+template <int Most>
+void BeliefStep<Most>::take_slopes_aside(std::span<const TransitionPlace> places, std::span<const Part> beliefs,
+                                         std::span<const Matrix> roots) {
+  aside_.clear();
+  if (!fails_ || pairs() == 0) return;
+  MachineStepper stepper = stepper_.another();
+  for (std::size_t t = 0; t < places.size(); ++t) {
+    if (!stepper_.failed(centre_of(t))) continue;
+    const auto point = point_that_goes_on(t);
+    if (!point) continue;
+    const Vector scores = lattice_.template at<Vector>(*point, stepper_.scores());
+    add_pairs(stepper, places[t], beliefs[t].mean.head(size()), roots[t], scores, scores);
+    aside_[t].point = *point;
+  }
+  if (aside_.empty()) return;
+  stepper.run();
+  for (std::size_t first = 0; auto& [trial, aside] : aside_) {
+    const Vector centre = stepper_.next(lattice_start(trial) + aside.point);
+    aside.first = first_differences(stepper, first, &centre, aside.bend);
+    first += 2 * pairs();
+  }
+}
+
+// Slopes that were taken aside stay the same along the scores of the lattice.
 template <int Most>
 typename BeliefStep<Most>::Slopes BeliefStep<Most>::slopes(std::size_t trial) const {
   Slopes s;
+  if (const auto found = aside_.find(trial); found != aside_.end()) {
+    const auto& [point, first, bend] = found->second;
+    s = {stepper_.next(lattice_start(trial) + point), first, bend, {}};
+    s.by_score.assign(lattice_.scores.size(), Matrix::Zero(states(), static_cast<Eigen::Index>(pairs())));
+    return s;
+  }
   s.centre = stepper_.next(centre_of(trial));
   const bool lost = stepper_.failed(centre_of(trial));
   if (lost) s.centre.setZero();  // a failed state is none
-  s.first = first_differences(pair_start(trial), lost ? nullptr : &s.centre, s.bend);
+  s.first = first_differences(stepper_, pair_start(trial), lost ? nullptr : &s.centre, s.bend);
   for (std::size_t b = 0; b < lattice_.scores.size(); ++b) s.by_score.push_back(mixed_differences(trial, b));
   return s;
 }
@@ -517,6 +574,7 @@ void BeliefStep<Most>::step(std::span<const TransitionPlace> places, std::span<c
   stepper_.clear();
   for (std::size_t t = 0; t < places.size(); ++t) add_points(places[t], beliefs[t], roots[t]);
   run_points(places.size());
+  take_slopes_aside(places, beliefs, roots);
   std::vector<FailureLine<Most>> lines;
   const FailureEdges<Most> edges(stepper_, lattice_, points_, lattice_start(0));
   if (fails_) lines = edges.lines(places, beliefs, roots, used_);

@@ -3,6 +3,7 @@
 
 #include <Eigen/Core>
 #include <functional>
+#include <map>
 #include <optional>
 #include <span>
 #include <vector>
@@ -37,7 +38,7 @@ class BeliefStep {
   /// @param bent      parts stay bent in the scores of the lattice, which then are the last numbers of the vector
   /// @param outliers  share of steps whose scores are drawn outlier_width times as wide
   BeliefStep(MachineStepper& stepper, const ScorePlan& plan, std::size_t shared, bool bent, double outliers);
-  /// Steps beliefs, all in one or two calls of the machine's map, and hands on what comes of each, in their order.
+  /// Steps beliefs, all in a few calls of the machine's map, and hands on what comes of each, in their order.
   /// @param take  is given the number of the belief and its distribution after the step, which it may change
   void step(std::span<const TransitionPlace> places, std::span<const Part> beliefs,
             const std::function<void(std::size_t, AfterStep<Most>&)>& take);
@@ -58,7 +59,12 @@ class BeliefStep {
   void run_points(std::size_t trials);
   bool not_asked(std::size_t point) const;
   bool told(std::size_t trial);
-  Matrix first_differences(std::size_t at, const Vector* centre, Matrix& bend) const;
+  Matrix first_differences(const MachineStepper& stepper, std::size_t at, const Vector* centre, Matrix& bend) const;
+  void add_pairs(MachineStepper& stepper, const TransitionPlace& place, const Vector& mean, const Matrix& root,
+                 const Vector& scores, const Vector& mirrored) const;
+  std::optional<std::size_t> point_that_goes_on(std::size_t trial) const;
+  void take_slopes_aside(std::span<const TransitionPlace> places, std::span<const Part> beliefs,
+                         std::span<const Matrix> roots);
   Matrix mixed_differences(std::size_t trial, std::size_t axis) const;
   Slopes slopes(std::size_t trial) const;
   Matrix columns(const Matrix& slope, const Matrix& root) const;
@@ -97,6 +103,13 @@ class BeliefStep {
   std::optional<Merged> merged_;
   bool sought_ = false;
   std::vector<Vector> carried_;  // by belief: of the part's vector, what moves with a unit of the merged score
+
+  // Slopes about a point of the lattice, for a belief whose mean fails with all scores at zero.
+  struct Aside {
+    std::size_t point;  // of the lattice
+    Matrix first, bend;
+  };
+  std::map<std::size_t, Aside> aside_;  // by belief
 };
 
 }  // namespace metastable::analysis

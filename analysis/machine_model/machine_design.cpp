@@ -1,6 +1,7 @@
 #include "analysis/machine_model/machine_design.h"
 
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 
 #include <algorithm>
 #include <array>
@@ -19,6 +20,10 @@ namespace {
 // half of one. The numbers assume that the machine turns by less than that in a step.
 constexpr double within_turn = 1.05, full_jump = 0.7, half_jump = 0.4, least_span = 0.9;
 constexpr std::size_t fewest_jumps = 3, jumps_to_moves = 10;
+// An error of half a column's spread is a quarter of its variance, and makes slopes from there as much too flat. Where
+// the column goes far beyond its first values, its later ones tell the slopes.
+constexpr double most_error = 0.5;
+constexpr std::size_t fewest_first = 5;
 
 // Fills in means and spreads of the columns.
 void measure_columns(MachineDesign& design, const Machine& machine, const MachineRuns& runs) {
@@ -112,6 +117,22 @@ std::vector<std::string> wrapping_columns(const Machine& machine, const MachineR
             "beyond {1}?",
             machine.observe[j].state, name, jumps));
   return asked;
+}
+
+std::string unseen_launches(const Machine& machine, const MachineRuns& runs) {
+  std::vector<std::string> columns;
+  for (std::size_t j = 0; j < machine.observe.size(); ++j) {
+    const MachineSensor& sensor = machine.observe[j];
+    const FirstValues first = first_values(runs, j);
+    if (!machine.stated_launch(sensor.state) && first.count >= fewest_first &&
+        sensor.sd.value_or(0) > most_error * std::max(first.sd, column_spread(runs, j).sd))
+      columns.push_back(fmt::format("{} (sd {:.3g}, error {:.3g})", sensor.state, first.sd, *sensor.sd));
+  }
+  if (columns.empty()) return "";
+  return fmt::format(
+      "launch: first values scatter little beyond the error of their sensor: {}: they hardly tell where trials begin, "
+      "and slopes of the map seem flatter than they are: can the launch be stated, its mean and sd?",
+      fmt::join(columns, ", "));
 }
 
 MachineDesign machine_design(const Machine& machine, const MachineRuns& runs) {

@@ -45,9 +45,13 @@ struct MachineDesign {
 
 MachineDesign machine_design(const Machine& machine, const MachineRuns& runs);
 
-/// Asks, in a sentence each, about sensors whose values seem to wrap: they stay within a turn (2 pi, or 360) and jump by
-/// about one from row to row. Slopes of the map across such a jump are wrong.
+/// Asks, in a sentence each, about sensors whose values seem to wrap: they stay within a turn (2 pi, or 360) and jump
+/// by about one from row to row. Slopes of the map across such a jump are wrong.
 std::vector<std::string> wrapping_columns(const Machine& machine, const MachineRuns& runs);
+
+/// Asks, in a sentence, for launches that are neither stated nor seen: the first values of trials scatter little beyond
+/// the error of their sensor. Trials would be taken to begin where that error put them. Empty: there are none.
+std::string unseen_launches(const Machine& machine, const MachineRuns& runs);
 
 /// Returns a number for every step.
 template <class Of>

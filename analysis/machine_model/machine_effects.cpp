@@ -22,7 +22,8 @@ constexpr std::size_t fewest_trials = 5;  // whose spread is told
 // in the record.
 constexpr std::size_t most_waves = 512, fewest_waves = 128;
 constexpr double waves_apart = 0.5;
-constexpr int stretches = 6;  // of the way
+constexpr int stretches = 6;    // of the way
+constexpr long much_rarer = 2;  // The rarer of two values has less than one step for so many of the other.
 constexpr double largest_memory = 0.9;
 // Zeros of sensors are known to a share of what a column spans, or to some of its errors.
 constexpr double usual_bias = 0.1, bias_errors = 3;
@@ -109,14 +110,24 @@ class Varying {
     };
   }
 
+  // Where the nominal value is fitted, either of two values of a column differs from the other by the same: one of them
+  // is enough. It is the first one unless the second is much rarer, since what is known of a parameter is known of most
+  // steps.
+  template <class ValueAt>
+  void keep_rarer_of_two(Candidate& one, ValueAt value_at) const {
+    if (one.variants.size() != 2 || !(parameter_.sd > 0)) return;
+    const auto count = [&](int value) { return std::ranges::count(design_.steps, value, value_at); };
+    if (much_rarer * count(1) < count(0)) std::swap(one.variants[0], one.variants[1]);
+    one.variants.resize(1);
+  }
+
   MachineCandidate by_phase() const {
     MachineCandidate one = named("_by_phase");
     one.candidate.parameters = {change()};
     one.candidate.variants.clear();
     for (std::size_t phase = 0; phase < std::max<std::size_t>(1, design_.phases.size()); ++phase)
       one.candidate.variants.push_back({static_cast<double>(phase)});
-    if (design_.phases.size() == 2 && parameter_.sd > 0)
-      one.candidate.variants.resize(1);  // the other differs by the same, and the nominal is fitted
+    keep_rarer_of_two(one.candidate, [](const StepPlace& at) { return at.phase; });
     if (design_.phases.size() < 2) one.candidate.undecidable = "the runs have no column of phases with two of them";
     one.candidate.report = changed_in(design_.phases);
     one.candidate.form_of = [](const Values& v) { return FittedForm{{0}, {v[0]}}; };  // of the first phase
@@ -212,7 +223,7 @@ class Varying {
     one.candidate.variants.clear();
     for (std::size_t v = 0; v < std::max<std::size_t>(1, column.values.size()); ++v)
       one.candidate.variants.push_back({static_cast<double>(v)});
-    if (column.values.size() == 2 && parameter_.sd > 0) one.candidate.variants.resize(1);
+    keep_rarer_of_two(one.candidate, [label](const StepPlace& at) { return at.labels[label]; });
     if (column.values.size() < 2) one.candidate.undecidable = fmt::format("{} has one value", column.name);
     one.candidate.report = changed_in(column.values);
     one.apply = adding([label](const StepPlace& at, const Values& variant, std::size_t) {

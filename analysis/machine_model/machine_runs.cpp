@@ -511,12 +511,11 @@ std::vector<std::string> other_units(const Machine& machine, const NominalSteps&
       if (const double own = variance[i * d + s] + 2 * error * error; own > 0)
         scatters.push_back(median_deviation_to_sd * (seen - foretold) / std::sqrt(own));
     }
-    if (ratios.size() >= fewest_for_units)
-      suspect(machine.observe[j].state, "its values are", median(std::move(ratios)), values_apart);
-    if (scatters.size() < fewest_for_units) continue;
-    const double centre = median(scatters);  // An effect may have moved all rows alike.
-    for (double& one : scatters) one = std::abs(one - centre);
-    suspect(machine.observe[j].state, "it scatters", median(std::move(scatters)), scatters_apart);
+    // Values about zero have ratios of any size and sign, whose median is small by chance.
+    if (ratios.size() >= fewest_for_units && median_deviation(ratios) < std::abs(median(ratios)))
+      suspect(machine.observe[j].state, "its values are", median(ratios), values_apart);
+    if (scatters.size() >= fewest_for_units)  // An effect may have moved all rows alike.
+      suspect(machine.observe[j].state, "it scatters", median_deviation(scatters), scatters_apart);
   }
   return said;
 }

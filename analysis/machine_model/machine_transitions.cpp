@@ -5,9 +5,13 @@
 
 #include <algorithm>
 #include <cmath>
+#include <deque>
+#include <functional>
 #include <limits>
+#include <mutex>
 #include <set>
 #include <stdexcept>
+#include <unordered_map>
 #include <utility>
 
 #include "analysis/fitting/effect_fit.h"
@@ -56,6 +60,57 @@ bool is_outliers(const EffectTerm& term) { return term.candidate->id == "outlier
 
 double share_of(double logit) { return 1 / (1 + std::exp(-logit)); }
 
+// Holds the latest evaluations of a model: the stages of a diagnosis repeat each other's fits, which then go through
+// the same hypotheses. A copy starts without any, since it may be of other runs.
+class LatestEvaluations {
+ public:
+  LatestEvaluations() = default;
+  LatestEvaluations(const LatestEvaluations&) {}
+  LatestEvaluations& operator=(const LatestEvaluations&) = delete;
+
+  // Returns the evaluation of a hypothesis, which `evaluate` makes unless it is held.
+  Evaluation of(std::span<const double> nuisance, std::span<const EffectTerm> terms,
+                const std::function<Evaluation()>& evaluate) {
+    const std::string key = key_of(nuisance, terms);
+    {
+      const std::lock_guard lock(mutex_);
+      if (const auto held = held_.find(key); held != held_.end()) return held->second;
+    }
+    Evaluation made = evaluate();
+    const std::lock_guard lock(mutex_);
+    if (!held_.emplace(key, made).second) return made;
+    order_.push_back(key);
+    const std::size_t each = 3 * sizeof(double) * made.score.size();
+    while (order_.size() > most_held || order_.size() * each > most_bytes) {
+      held_.erase(order_.front());
+      order_.pop_front();
+    }
+    return made;
+  }
+
+ private:
+  static constexpr std::size_t most_held = 1000, most_bytes = 50'000'000;
+
+  // Returns all that tells one hypothesis from another. An effect is known by its id.
+  static std::string key_of(std::span<const double> nuisance, std::span<const EffectTerm> terms) {
+    std::string key;
+    const auto add = [&](std::span<const double> values) {
+      key.append(reinterpret_cast<const char*>(values.data()), values.size_bytes());
+    };
+    add(nuisance);
+    for (const EffectTerm& term : terms) {
+      key.append(term.candidate->id.c_str(), term.candidate->id.size() + 1);
+      add(term.variant);
+      add(term.values);
+    }
+    return key;
+  }
+
+  std::mutex mutex_;
+  std::unordered_map<std::string, Evaluation> held_;
+  std::deque<std::string> order_;  // The oldest comes first.
+};
+
 class MachineTransitions : public TransitionModel {
  public:
   MachineTransitions(std::shared_ptr<const Machine> machine, MachineRuns runs)
@@ -64,6 +119,8 @@ class MachineTransitions : public TransitionModel {
         runs_(std::move(runs)) {
     notes_ = look_over(*machine_, runs_);
     for (std::string& question : wrapping_columns(*machine_, runs_)) notes_.push_back(std::move(question));
+    if (std::string question = unseen_launches(*machine_, runs_); !question.empty())
+      notes_.push_back(std::move(question));
     design_ = std::make_shared<MachineDesign>(machine_design(*machine_, runs_));
     set_up_nuisances();
     plan_ = score_plan(*machine_, runs_, hypothesis(nominal_values(*this), {}));
@@ -98,7 +155,8 @@ class MachineTransitions : public TransitionModel {
     return std::ranges::any_of(machine_->observe, [](const MachineSensor& s) { return !s.sd; });
   }
   Evaluation evaluate(std::span<const double> nuisance, std::span<const EffectTerm> terms) const override {
-    return follow_machine(*machine_, runs_, plan_, events_, hypothesis(nuisance, terms));
+    return latest_.of(nuisance, terms,
+                      [&] { return follow_machine(*machine_, runs_, plan_, events_, hypothesis(nuisance, terms)); });
   }
   void side_by_side(std::size_t count, int threads, const std::function<void(std::size_t)>& work) const override {
     if (!machine_->dear) return TransitionModel::side_by_side(count, threads, work);
@@ -201,6 +259,7 @@ class MachineTransitions : public TransitionModel {
   MachineVariation push_;
   std::vector<std::string> notes_;
   std::shared_ptr<const TolerantStarts> starts_;  // those of a copy are its own
+  mutable LatestEvaluations latest_;
 };
 
 void MachineTransitions::set_up_nuisances() {
@@ -500,6 +559,10 @@ std::vector<std::string> MachineTransitions::misstated(const Fit& recalibrated) 
 }
 
 }  // namespace
+
+std::unique_ptr<TransitionModel> machine_as_stated(std::shared_ptr<const Machine> machine, MachineRuns runs) {
+  return std::make_unique<MachineTransitions>(refusing_nan(std::move(machine)), std::move(runs));
+}
 
 std::unique_ptr<TransitionModel> machine_transitions(std::shared_ptr<const Machine> machine, MachineRuns runs) {
   auto model = std::make_unique<MachineTransitions>(refusing_nan(std::move(machine)), std::move(runs));

@@ -59,4 +59,8 @@ namespace metastable::analysis {
 ///   neither noise nor an error of measurement; here and in every later call as the step of refusing_nan()
 std::unique_ptr<TransitionModel> machine_transitions(std::shared_ptr<const Machine> machine, MachineRuns runs);
 
+/// Returns the same without fitting anything: what is stated of a parameter stands, however far a recalibration leaves
+/// it behind.
+std::unique_ptr<TransitionModel> machine_as_stated(std::shared_ptr<const Machine> machine, MachineRuns runs);
+
 }  // namespace metastable::analysis

@@ -45,7 +45,7 @@ std::unique_ptr<TolerantStarts::Tolerant> TolerantStarts::tolerant() const {
   auto found = std::make_unique<Tolerant>();
   found->model = machine_transitions(without_wild_rows(*machine_, times_the_error), runs_);
   found->recalibrated = fit(*found->model, nominal_values(*found->model), {});
-  const std::unique_ptr<TransitionModel> strict = machine_transitions(without_wild_rows(*machine_, 1), runs_);
+  const std::unique_ptr<TransitionModel> strict = machine_as_stated(without_wild_rows(*machine_, 1), runs_);
   found->for_effects = many_far_off(*strict, found->recalibrated.nuisance, machine_->most_wild);
   if (!found->for_effects)
     return many_far_off(*strict, nominal_values(*strict), machine_->most_wild) ? std::move(found) : nullptr;

@@ -2,7 +2,9 @@
 // Finds the middle of a sample.
 
 #include <algorithm>
+#include <cmath>
 #include <cstddef>
+#include <utility>
 #include <vector>
 
 namespace metastable::analysis {
@@ -12,6 +14,13 @@ inline double median(std::vector<double> values) {
   const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
   std::nth_element(values.begin(), middle, values.end());
   return *middle;
+}
+
+/// Returns the median distance of values from their median. @param values  not empty
+inline double median_deviation(std::vector<double> values) {
+  const double centre = median(values);
+  for (double& one : values) one = std::abs(one - centre);
+  return median(std::move(values));
 }
 
 /// The median absolute deviation of a normal times this is its standard deviation: 1 / Phi^-1(3/4).

@@ -135,18 +135,32 @@ def _one_a_row(values, name, rows, kind=None):
 
 
 def _floats(values, name, rows):
-    """Numbers of a column; NaN where one is missing."""
+    """Numbers of a column; NaN where one is missing, as an empty text of a CSV file is."""
     if numpy.ma.isMaskedArray(values):
         raise TypeError(f"{name}: a masked array is given: fill what is missing with NaN")
     array = _one_a_row(values, name, rows)
     if array.dtype.kind in "mMc":  # NumPy would count nanoseconds, or drop the imaginary part.
         raise TypeError(f"{name}: an array of numbers expected, not of {array.dtype}")
-    if array.dtype == object:
-        array = numpy.array([math.nan if _missing(one) else one for one in array], object)
+    if array.dtype == object or array.dtype.kind in "US":
+        array = numpy.array([math.nan if _missing(one) or _blank(one) else one for one in array], object)
     try:
         return array.astype(float)
     except (TypeError, ValueError):
-        raise TypeError(f"{name}: an array of numbers expected") from None
+        raise TypeError(f"{name}: numbers expected, and NaN for missing ones{_first_no_number(array)}") from None
+
+
+def _blank(one):
+    return isinstance(one, (str, bytes)) and not one.strip()
+
+
+def _first_no_number(array):
+    """Names the first value that is no number."""
+    for at, one in enumerate(array):
+        try:
+            float(one)
+        except (TypeError, ValueError):
+            return f", not {str(one)!r} in row {at + 1}"
+    return ""
 
 
 def _seconds(values, name, rows):
@@ -308,7 +322,9 @@ class Runs:
 
         trial = find("trial")
         if trial is None:
-            raise InputError("runs: there is no column trial")
+            raise InputError("runs: there is no column trial, which says of every row to which trial it belongs")
+        if not hasattr(trial, "__len__") or isinstance(trial, (str, bytes)):
+            raise TypeError(f"trial: one for every row expected, not {trial!r} for all of them")
         self.rows = rows = len(trial)
         trial = _one_a_row(trial, "trial", rows)
         by_condition = find("condition") if find("condition") is not None else numpy.full(rows, "all")
@@ -511,12 +527,12 @@ def runs(machine, data=None, *, outcome=None, labels=(), inputs=None, **columns)
     machine   of machine()
     data      anything with columns, a pandas.DataFrame or a dict of arrays: columns are looked for there where they are
               not given by name; or an experiment folder whose experiment.toml states model = "none"
-    columns   trial, and every state that the machine's sensor measures (NaN: missing); optionally step, condition,
-              phase (which leg, which half of the cycle: it belongs to the step that starts from the row), time_s by one
-              clock for all trials (durations and dates become seconds), position_m. step numbers the rows of a trial,
-              from any whole number on; where some are left out, rows in which nothing was measured are put in. Time
-              and place go on evenly in them, phases and labels as they are seen to follow each other, inputs that are
-              the same all through the trial; what does not follow is refused
+    columns   trial, and every state that the machine's sensor measures (NaN or an empty text: missing); optionally
+              step, condition, phase (which leg, which half of the cycle: it belongs to the step that starts from the
+              row), time_s by one clock for all trials (durations and dates become seconds), position_m. step numbers
+              the rows of a trial, from any whole number on; where some are left out, rows in which nothing was measured
+              are put in. Time and place go on evenly in them, phases and labels as they are seen to follow each other,
+              inputs that are the same all through the trial; what does not follow is refused
     outcome   "failed", "stopped" or "lost" by trial, as a dict or a pandas.Series whose keys are the trials, or
               (condition, trial) where each condition numbers its trials anew; or a list in the order of the trials.
               "failed": the machine failed in the step after the trial's last row

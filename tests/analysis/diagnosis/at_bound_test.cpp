@@ -47,7 +47,7 @@ TEST(AtBound, AnEffectThatIsLargerThanItMayBeIsSaid) {
     EXPECT_EQ(one.parameter, "c");
     EXPECT_FALSE(one.upper);
     EXPECT_NEAR(one.value, -0.05, 1e-6);
-    EXPECT_NE(all_of(d).find("The bend's c stands at the lower bound of its range, -0.05: its interval has one side "
+    EXPECT_NE(all_of(d).find("The c of bend stands at the lower bound of its range, -0.05: its interval has one side "
                              "only"),
               std::string::npos)
         << all_of(d);
@@ -101,6 +101,9 @@ TEST(AtBound, OnlyAnErrorOrAShareOfNothingIsNotSaid) {
   EXPECT_TRUE(with_one_at(*model, "logit wild_share", false).empty());
   EXPECT_EQ(with_one_at(*model, "log sensor sd of x", true).front().parameter, "sensor_sd_x");
   expect_one(with_one_at(*model, "logit wild_share", true), "wild_share", true, 0.01);
+  EXPECT_NE(at_bound_in_words(with_one_at(*model, "logit wild_share", true).front())
+                .find("The fitted wild_share stands at the largest that most_wild allows, 0.01: more rows may be wild"),
+            std::string::npos);
 }
 
 // The report holds the hub's inertia and not the law's error, whose ratio is said by its own name.

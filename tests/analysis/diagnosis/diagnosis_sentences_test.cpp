@@ -37,5 +37,25 @@ TEST(DiagnosisSentences, SayWhatAnEffectClosesBesideOtherParameters) {
             "when it is added to the recalibrated model.");
 }
 
+std::string next_for(std::size_t trials, std::size_t steps, const std::string& step_name) {
+  Diagnosis d;
+  d.verdict = Verdict::unexplained;
+  d.data.trials = trials;
+  d.data.collisions = steps;
+  d.data.step_name = step_name;
+  return next_step(d);
+}
+
+TEST(DiagnosisSentences, OneLongTrialMayBeCut) {
+  EXPECT_NE(
+      next_for(1, 244, "step").find("or cut long ones: a trial number of its own for every 24 rows makes about 10."),
+      std::string::npos)
+      << next_for(1, 244, "step");
+  for (const std::string& uncut : {next_for(1, 244, "collision"), next_for(2, 30, "step")})
+    EXPECT_NE(uncut.find("trials like these, and diagnose them together."), std::string::npos) << uncut;
+  EXPECT_NE(next_for(10, 30, "step").find("Run 14 trials like these, or longer ones,"), std::string::npos)
+      << next_for(10, 30, "step");
+}
+
 }  // namespace
 }  // namespace metastable::analysis

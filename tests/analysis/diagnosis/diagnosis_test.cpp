@@ -185,6 +185,23 @@ TEST(Diagnosis, APairThatGainsOnlyTogetherDoesNotExplain) {
   EXPECT_NE(d.sentences[1].find("as much together as alone"), std::string::npos) << d.sentences[1];
 }
 
+// The same beside a slope that is misread. In the place of one of the two effects such a scatter is hardly likelier
+// than that effect, but beside it neither of them says anything.
+TEST(Diagnosis, OneVariationStandsInThePlaceOfTwoEffects) {
+  const Experiment experiment = in_laboratory({.effects = {dynamics::Effect{"slope_offset", {0.015}}},
+                                               .outside = {{"speed_spread", 0.22}},
+                                               .sensor_noise = 0.008,
+                                               .seed = 38});
+  DiagnosisOptions options = quick();
+  options.catalogue = {"speed_dependent_restitution", "speed_dependent_friction", "slope_offset", "leg_contact"};
+  const Diagnosis d = decided(*wheel_transitions(experiment), options);
+  std::vector<std::string> names;
+  for (const AtWork& one : d.causes.at_work)
+    if (one.probability >= options.rules.least_at_work) names.push_back(one.name);
+  EXPECT_EQ(names, std::vector<std::string>{"slope_offset"});
+  EXPECT_EQ(d.verdict, Verdict::partly_explained);
+}
+
 // Friction rises and falls over the trials, as no effect does: of all that it may vary by, the swing has most evidence.
 TEST(Diagnosis, WhatVariesWithoutANameSaysByWhat) {
   const Experiment experiment = in_laboratory({.outside = {{"daily_cycle", 0.03}}, .sensor_noise = 0.008, .seed = 31});

@@ -30,6 +30,19 @@ TEST(EffectFit, TakesAllItsTimeOverFewEvents) {
   EXPECT_EQ(effort_for(model, recalibrated).most_leaders, Effort{}.most_leaders);
 }
 
+class OneTrial : public test::Line {
+ public:
+  explicit OneTrial(const Line& from) : Line(from) {}
+  std::size_t trials() const override { return 1; }
+};
+
+TEST(EffectFit, RanksNoLargerSetsWhereTrialsAreTooFewToNameACause) {
+  const auto model = line(0, 5, 300);
+  const Fit recalibrated = fit(model, {0, 0}, {});
+  EXPECT_EQ(effort_for(model, recalibrated).most_effects, Effort{}.most_effects);
+  EXPECT_EQ(effort_for(OneTrial(model), recalibrated).most_effects, 2U);
+}
+
 // An effect of two kinds at each of three places. At 1 the second kind is what the data have, but where it is small it
 // does half of that only, so that the first kind, which does nearly all of it at any size, promises more.
 class TwoKinds : public test::Line {

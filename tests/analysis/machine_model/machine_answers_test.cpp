@@ -2,8 +2,11 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 #include <memory>
+#include <random>
+#include <set>
 #include <string>
 #include <vector>
 
@@ -128,6 +131,40 @@ TEST(MachineAnswers, KnowThatFailuresComeEarly) {
   set_later_steps(steps, *model, fit(*model, nominal_values(*model), {}));
   EXPECT_GT(steps.later_times, 2);
   EXPECT_GT(steps.later, 1);
+}
+
+// What a parameter loses in proportion to a state is the same as the parameter with that state. The scores of either
+// promise other shares of a large gain, and both stand in the sets.
+TEST(MachineAnswers, RankEffectsThatActAlikeInTheSameSets) {
+  Machine machine;
+  machine.states = {"period"};
+  machine.parameters = {{"kept", 0.93, 0.05}, {"scatter", 0.003, 0.003, 0, 0.1}};
+  machine.effects = {{"loss", {{"per_s", 0, -0.5, 0.5}}}, {"pause", {{"pause_s", 0, -0.05, 0.05}}}};
+  machine.may_vary = {"kept"};
+  machine.observe = {{"period", 0.0005, -0.5}};
+  machine.step = [](const MachineBatch& batch) {
+    for (std::size_t i = 0; i < batch.rows; ++i) {
+      const double period = batch.states[i];
+      batch.next[i] = (batch.value(0, i) - batch.value(2, i) * period) * period + batch.value(3, i) +
+                      batch.value(1, i) * batch.scores[i];
+    }
+  };
+  for (const unsigned seed : {1U}) {
+    std::mt19937_64 generator(seed);
+    std::uniform_real_distribution<double> share;
+    const auto next = [&](double x, double z, std::size_t) {
+      return (1 - 0.15 * x) * x - 0.0045 + (share(generator) < 0.15 ? 0.004 : 0.001) * z;
+    };
+    const Diagnosis d = answer_to(machine, scalar_runs(25, 8, 0.35, 0.0003, seed, next),
+                                  {"loss", "pause", "kept_with_period", "outliers"});
+    for (const char* one : {"loss", "kept_with_period"}) {
+      const auto with = [&](const Cause& cause) {
+        std::set<std::string> effects(cause.effects.begin(), cause.effects.end());
+        return effects == std::set<std::string>{one, "pause", "outliers"} && cause.probability > 0.2;
+      };
+      EXPECT_TRUE(std::ranges::any_of(d.causes.ranked, with)) << one << told(d);
+    }
+  }
 }
 
 }  // namespace

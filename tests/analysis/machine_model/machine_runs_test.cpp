@@ -93,6 +93,30 @@ TEST_F(LookedOver, LaunchesThatAreNotThoseStatedAreNoted) {
   EXPECT_EQ(said(), "");
 }
 
+// Trials of these runs begin at places with an sd of 0.3.
+TEST_F(LookedOver, LaunchesThatAreNeitherStatedNorSeenAreAskedFor) {
+  EXPECT_EQ(unseen_launches(machine_, runs_), "");
+  machine_.observe[0].sd = 0.2;
+  EXPECT_EQ(unseen_launches(machine_, runs_).find("launch: first values scatter little beyond the error"), 0u);
+  machine_.launches = {{"x", 1.5, 0.1}};
+  EXPECT_EQ(unseen_launches(machine_, runs_), "");
+}
+
+// Values that scatter about zero are any multiple of what the map makes of the rows before: here -1.2, pi / 180 and 1.3
+// times as much in turn. Were all of them pi / 180 times as much, radians would be asked about.
+TEST_F(LookedOver, ValuesAboutZeroAreInNoOtherUnit) {
+  machine_.parameters[1].nominal = 0;
+  for (const bool alike : {false, true}) {
+    for (std::size_t t = 0; t < runs_.trials.size(); ++t)
+      for (std::size_t k = 0; k < runs_.trials[t].rows.size(); ++k) {
+        const double radians = std::numbers::pi / 180;
+        const double ratio = alike || t % 3 == 0 ? radians : t % 3 == 1 ? -1.2 : 1.3;
+        runs_.trials[t].rows[k].seen = {k % 3 == 2 ? missing : k % 3 == 1 ? 0.8 * ratio : 1.0};
+      }
+    EXPECT_EQ(said().find("x: its values are 0.0175 times") != std::string::npos, alike) << said();
+  }
+}
+
 TEST_F(LookedOver, ALabelThatNamesTwoMachinesIsRefused) {
   runs_.labels = {{"machine", {"old", "new"}}};
   for (std::size_t t = 0; t < runs_.trials.size(); ++t)

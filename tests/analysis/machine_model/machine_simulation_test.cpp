@@ -79,6 +79,25 @@ TEST(MachineSimulation, EveryEffectHasALikelihood) {
   for (const MachineVariation& one : machine_variations(machine, design)) check(one, one.variation.candidate);
 }
 
+// Of two values of a label the rare one is said to differ, whichever comes first: the parameter's stated value is that
+// of most steps, so that what is known of it does not pull at the size.
+TEST(MachineEffects, TheRarerOfTwoValuesIsTheOneThatDiffers) {
+  const Machine machine = linear_machine(0.1);
+  for (const bool second_is_rare : {true, false}) {
+    MachineRuns runs = measured();
+    runs.labels = {{"floor", {"dry", "wet"}}};
+    for (MachineTrial& trial : runs.trials)
+      for (std::size_t k = 0; k < trial.rows.size(); ++k)
+        trial.rows[k].labels = {(k % 5 == 0) == second_is_rare ? 1 : 0};
+    const auto effects = machine_effects(machine, std::make_shared<MachineDesign>(machine_design(machine, runs)));
+    const auto found = std::ranges::find(effects, "b_by_floor", [](const auto& one) { return one.candidate.id; });
+    ASSERT_NE(found, effects.end());
+    ASSERT_EQ(found->candidate.variants.size(), 1u);
+    EXPECT_EQ(found->candidate.report(found->candidate.variants[0], {0.1})[0].first,
+              second_is_rare ? "change_in_wet" : "change_in_dry");
+  }
+}
+
 TEST(MachineSimulation, ExperimentsDrawnTogetherAreThoseDrawnAlone) {
   const Machine machine = linear_machine(0.1, -0.5);
   const MachineRuns runs = measured();

@@ -4,10 +4,14 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
+#include <atomic>
 #include <cmath>
 #include <memory>
 #include <numbers>
 #include <string>
+#include <utility>
+#include <vector>
 
 #include "analysis/diagnosis/diagnosis.h"
 #include "analysis/fitting/effect_scan.h"
@@ -331,6 +335,40 @@ TEST(MachineTransitions, ExpectedStepsKnowLaunchesFromAFewTrials) {
   // The mean and the sd of 30 normal launches leave 0.52^2 open, their count below the edge 0.7^2.
   EXPECT_GT(variance, 0.15);
   EXPECT_LT(variance, 1.2);
+}
+
+// A hypothesis that was evaluated lately is not stepped again, whoever asks; every other one is.
+TEST(MachineTransitions, RememberTheLatestHypotheses) {
+  Machine machine = linear_machine(0.05);
+  const auto calls = std::make_shared<std::atomic<int>>(0);
+  machine.step = [calls, step = machine.step](const MachineBatch& batch) {
+    ++*calls;
+    step(batch);
+  };
+  const auto next = [](double x, double z, std::size_t) { return 0.8 * x + 0.3 + 0.2 * z; };
+  const auto model =
+      machine_transitions(std::make_shared<const Machine>(machine), scalar_runs(10, 6, 1.5, 0.05, 3, next));
+  const std::vector<double> nominal = nominal_values(*model);
+  std::vector<double> moved = nominal;
+  moved[0] += 0.0123;
+  const Candidate &bend = *std::ranges::find(model->candidates(), "bend", &Candidate::id),
+                  &drift = *std::ranges::find(model->candidates(), "b_drift", &Candidate::id);
+  const auto term = [](const Candidate& candidate, double size) {
+    return std::vector{EffectTerm{&candidate, candidate.variants[0], {size}}};
+  };
+  const std::vector<std::pair<std::vector<double>, std::vector<EffectTerm>>> hypotheses{
+      {moved, {}}, {moved, term(bend, 0.0123)}, {moved, term(bend, 0.0124)}, {moved, term(drift, 0.0123)}};
+  std::vector<std::vector<double>> found;
+  for (const auto& [nuisance, terms] : hypotheses) {
+    const int before = *calls;
+    const std::vector<double> first = model->evaluate(nuisance, terms).log_density;
+    const int once = *calls;
+    EXPECT_GT(once, before);
+    EXPECT_EQ(model->evaluate(nuisance, terms).log_density, first);
+    EXPECT_EQ(*calls, once);
+    EXPECT_EQ(std::ranges::count(found, first), 0);
+    found.push_back(first);
+  }
 }
 
 }  // namespace

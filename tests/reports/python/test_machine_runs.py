@@ -158,6 +158,13 @@ class Missing(Columns):
         self.refused("condition: row 2 has none", condition=["a", NAType()] * 3)
         self.refused("step: it is nan in trial 1, row 2", step=[1, NAType(), 3, 1, 2, 3])
 
+    def test_texts_of_files_are_numbers(self):
+        seen = laid_out(trial=[1, 1, 1], swing_rad=["0.8", " ", "0.75"])["seen"]
+        np.testing.assert_array_equal(seen, [[0.8], [np.nan], [0.75]])
+        self.refused("swing_rad: numbers expected, and NaN for missing ones, not '0,7' in row 2", TypeError,
+                     swing_rad=["0.8", "0,7", "0.6", "0.8", "0.7", "0.6"])
+        self.refused("trial: one for every row expected, not 1 for all of them", TypeError, trial=1)
+
     def test_times_are_seconds(self):
         dates = np.datetime64("2024-01-01", "ns") + 500 * np.arange(6).astype("timedelta64[ms]")
         half, start = datetime.timedelta(seconds=0.5), datetime.datetime(2024, 1, 1, tzinfo=datetime.timezone.utc)
