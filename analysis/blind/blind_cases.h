@@ -114,8 +114,8 @@ BlindCase blind_case(const BlindPlan& plan, int number, std::uint64_t seed, cons
 /// Sets truth.left from the case's own files; a case without an effect that can be weighed keeps 0. A fit takes about a
 /// second.
 void complete_truth(BlindCase& made);
-/// Sets truth.left_by_effect of a case of several effects, by a fit each, truth.left_of_outside of a wheel's mixture,
-/// and truth.gap_as_given of one effect or several, by eight fits; other kinds stay as they are.
+/// Sets truth.left_by_effect of a case of several effects and of a mixture, by a fit or two each, truth.left_of_outside
+/// of a wheel's mixture, and truth.gap_as_given of one effect or several, by eight fits; other kinds stay as they are.
 /// @param experiment, walks  the case as it was written
 void complete_each(BlindTruth& truth, const Experiment& experiment);
 void complete_each(BlindTruth& truth, const Walks& walks);

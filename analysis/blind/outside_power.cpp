@@ -5,8 +5,8 @@
 #include <algorithm>
 #include <cmath>
 #include <numbers>
+#include <optional>
 #include <stdexcept>
-#include <tuple>
 #include <utility>
 #include <vector>
 
@@ -58,26 +58,33 @@ std::vector<double> by_trial(const TransitionModel& model, const Evaluation& see
   return sums;
 }
 
-// Says by how much the effect changes the contact of each collision. No effect changes more than one aspect.
+// Says by how much the effect changes the contact of each collision, in one aspect.
+// @throws std::logic_error for an effect that changes two
 Addition contacts_changed(const WheelRuns& measured, const dynamics::OutsideEffect& effect, double phase) {
-  constexpr double least_ratio = 1e-9;  // of a friction whose logarithm is taken
+  constexpr double least_ratio = 0.05;  // vary() takes none below it
   const auto change = dynamics::outside_info(effect.id).change;
   Addition changed;
+  std::optional<std::size_t> number;
   for (std::size_t t = 0; t < measured.runs.size(); ++t) {
     const WheelRun& run = measured.runs[t];
     for (std::size_t k = 0; k < run.collisions.size(); ++k) {
       dynamics::OutsideRatios ratios;
+      double by = 1;
       const CollisionPlace place = collision_place(run, t, k, run.collisions[k], run.collisions[k].before);
       if (change) change(effect.size, outside_place(place, measured, phase), ratios);
-      ContactAspect aspect = ContactAspect::mean_friction;
-      double ratio = ratios.friction;
-      if (ratios.restitution != 1)
-        std::tie(aspect, ratio) = std::pair(ContactAspect::mean_restitution, ratios.restitution);
-      if (ratios.scatter != 1) std::tie(aspect, ratio) = std::pair(ContactAspect::scatter_of_friction, ratios.scatter);
-      if (ratio != 1) changed.number = static_cast<std::size_t>(aspect);
-      changed.weights.push_back(std::log(std::max(least_ratio, ratio)));
+      for (const auto& [aspect, ratio] : {std::pair{ContactAspect::mean_friction, ratios.friction},
+                                          {ContactAspect::mean_restitution, ratios.restitution},
+                                          {ContactAspect::scatter_of_friction, ratios.scatter}}) {
+        if (ratio == 1) continue;
+        if (number && *number != static_cast<std::size_t>(aspect))
+          throw std::logic_error(fmt::format("outside effect {} changes two aspects of contacts", effect.id));
+        number = static_cast<std::size_t>(aspect);
+        by = ratio;
+      }
+      changed.weights.push_back(std::log(std::max(least_ratio, by)));
     }
   }
+  changed.number = number.value_or(static_cast<std::size_t>(ContactAspect::mean_friction));
   return changed;
 }
 

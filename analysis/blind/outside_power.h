@@ -25,8 +25,9 @@ std::set<std::string> columns_needed(std::string_view outside);
 double outside_power(const Experiment& experiment, const dynamics::NominalValues& contact,
                      const dynamics::OutsideEffect& effect);
 
-/// Returns 2 log(likelihood of the truth / of the best recalibrated model without the effect). No model states the
-/// skewness of a contact: the truth is taken with the true or with the refitted contact, whichever is likelier.
+/// Returns 2 log(likelihood of the truth / of the best recalibrated model without the effect). Contacts may
+/// be skewed, which no nuisance states exactly, so that the true contact need not be the likeliest: the truth is taken
+/// with the true or with the refitted one, whichever is likelier.
 /// @param beside  effects of the catalogue that both have; their sizes are refitted where the effect is lacking
 /// @throws std::invalid_argument for an effect that cannot be weighed
 double outside_power_left(const Experiment& experiment, const dynamics::NominalValues& contact,

@@ -73,9 +73,8 @@ std::vector<Fit> without_each(const TransitionModel& model, const Fit& joined, c
   return without;
 }
 
-// Returns by how much a variation, the last term of `joined`, is likelier in the place of several effects than of one
-// [ln]: each effect beside it that says nothing there is one more in the hypothesis, at Rules::pair_prior, and one less
-// with the variation.
+// Returns by how much [ln] the odds of a variation, the last term of `joined`, rise when effects that say nothing
+// beside it leave the hypothesis, too. An effect that stays costs Rules::pair_prior and brings its evidence.
 double log_odds_of_fewer(const TransitionModel& model, Fit joined, const Effort& effort,
                          const DiagnosisOptions& options, const std::function<void()>& beat) {
   double saved = 0;
@@ -156,7 +155,7 @@ std::optional<InPlace> in_place_of_effects(const TransitionModel& model, const C
   const double least = -std::log(options.rules.most_odds_of_none());  // The name stays while it may be as likely.
   found->gain = std::max(0.0, 2 * (with.penalised - others->penalised));
   double log_odds = prior + evidence_of(leader, found->gain, options.rules) - own_of_leader;
-  if (log_odds > std::log(least_odds) && log_odds <= least)
+  if (log_odds > std::log(least_odds) && log_odds <= least)  // Higher odds decide without that.
     log_odds += log_odds_of_fewer(model, with, effort, options, beat);
   if (!(log_odds > least)) return {};
   found->odds = std::exp(std::min(std::log(largest_odds_in_place), log_odds));

@@ -152,10 +152,9 @@ std::vector<std::string> notes_on_roughness(const Fitted& fitted, const Diagnosi
         recalibrated.reason, recalibrated.promised, 2 * recalibrated.promised));
   if (!fitted.ranking.scan.trials_suffice)
     notes.push_back(fmt::format(
-        "{} {} of {} transitions: chance levels come from the model's information alone; from {} trials "
+        "{} {} of {} transitions on average: chance levels come from the model's information alone; from {} trials "
         "of {} transitions on, from the trials' own scatter",
-        data.trials, data.trials == 1 ? "trial" : "trials",
-        std::lround(static_cast<double>(data.events) / static_cast<double>(std::max<std::size_t>(1, data.trials))),
+        data.trials, data.trials == 1 ? "trial" : "trials", data.events / std::max<std::size_t>(1, data.trials),
         Rules::enough_trials, Rules::enough_transitions));
   return notes;
 }

@@ -238,7 +238,9 @@ void say_verdict(std::vector<std::string>& s, const Diagnosis& d) {
 
 std::string where_in_words(const GapCell& cell, const std::string& step_name) {
   const std::string at = cell.at == step_name ? fmt::format("all {}s", step_name) : cell.at;
-  if (cell.aspect == "tail") return fmt::format("the tail of {} ({:+.2g} % of them far out)", at, 100 * cell.size);
+  if (cell.aspect == "tail")
+    return fmt::format("the tail of {} ({:.2g} % {} of them far out)", at, 100 * std::abs(cell.size),
+                       cell.size < 0 ? "fewer" : "more");
   if (cell.aspect == "spread" && cell.unit == "correlation")
     return fmt::format("what the {}s of a trial have in common ({:+.2g} {})", step_name, cell.size, cell.unit);
   return fmt::format("the {} of {} ({:+.2g} {})", cell.aspect, at, cell.size, cell.unit);
@@ -384,12 +386,12 @@ std::string what_it_buys(const Diagnosis& d) {
   return text;
 }
 
-// Says which trials would do where there are too few. A long one can be cut, because each row is judged given the ones
-// before it; a wheel's cannot, because its trials begin with a push.
+// Says which trials would do where there are too few. A machine's long one can be cut, because each row is judged given
+// the ones before it; the first row of each piece is no transition. Wheels and drums are pushed when a trial begins.
 std::string more_trials(const Diagnosis& d, std::size_t would_do) {
   const std::size_t rows = Rules::least_transitions_to_explain / Rules::least_trials_to_explain;
-  const std::size_t pieces = std::min(most_pieces, d.data.collisions / rows);
-  if (d.data.trials >= Rules::least_trials_to_explain || d.data.collides() || pieces < would_do)
+  const std::size_t pieces = std::min(most_pieces, d.data.collisions / (rows + 1));
+  if (d.data.trials >= Rules::least_trials_to_explain || d.data.step_name != "step" || pieces < would_do)
     return fmt::format("Run {} trials like these{}, and diagnose them together.", would_do,
                        d.data.trials >= Rules::least_trials_to_explain ? ", or longer ones" : "");
   return fmt::format(

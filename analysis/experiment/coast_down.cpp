@@ -25,8 +25,8 @@ constexpr int least_block = 10;                          // revolutions
 constexpr std::size_t around = 5;                        // periods on either side that a period is compared with
 constexpr double missed_from = 1.5, double_below = 0.6;  // of the median period
 constexpr double most_left_out = 0.1;                    // of a run's revolutions
-// A top speed [rad/s] of 29,000 revolutions a minute: drums of test stands stay below a tenth of it, and times in
-// milliseconds, which the log has in microseconds, would make them a thousand times as fast.
+// No drum of a test stand turns at a tenth of this speed [rad/s], 29,000 revolutions a minute. A log in milliseconds,
+// taken for microseconds, seems a thousand times as fast as it was.
 constexpr double fastest_drum = 3000;
 constexpr double whole_turn = 2 * std::numbers::pi;
 constexpr double huber = 1.345;  // 95 % efficiency under normal noise

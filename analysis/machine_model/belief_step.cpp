@@ -84,7 +84,7 @@ void BeliefStep<Most>::add_points(const TransitionPlace& place, const Part& beli
   }
 }
 
-// @param scores    of the upper point of each pair  @param mirrored  of the lower one
+// Adds two points for each column of the root and each straight score: the upper has `scores`, the lower `mirrored`.
 template <int Most>
 void BeliefStep<Most>::add_pairs(MachineStepper& stepper, const TransitionPlace& place, const Vector& mean,
                                  const Matrix& root, const Vector& scores, const Vector& mirrored) const {
@@ -244,7 +244,7 @@ void BeliefStep<Most>::take_slopes_aside(std::span<const TransitionPlace> places
   }
 }
 
-// Slopes that were taken aside stay the same along the scores of the lattice.
+// Slopes taken aside are supposed not to change with the scores of the lattice.
 template <int Most>
 typename BeliefStep<Most>::Slopes BeliefStep<Most>::slopes(std::size_t trial) const {
   Slopes s;

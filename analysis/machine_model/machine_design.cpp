@@ -23,7 +23,7 @@ constexpr std::size_t fewest_jumps = 3, jumps_to_moves = 10;
 // An error of half a column's spread is a quarter of its variance, and makes slopes from there as much too flat. Where
 // the column goes far beyond its first values, its later ones tell the slopes.
 constexpr double most_error = 0.5;
-constexpr std::size_t fewest_first = 5;
+constexpr std::size_t fewest_first = 5;  // So many first values tell a spread.
 
 // Fills in means and spreads of the columns.
 void measure_columns(MachineDesign& design, const Machine& machine, const MachineRuns& runs) {
@@ -126,12 +126,13 @@ std::string unseen_launches(const Machine& machine, const MachineRuns& runs) {
     const FirstValues first = first_values(runs, j);
     if (!machine.stated_launch(sensor.state) && first.count >= fewest_first &&
         sensor.sd.value_or(0) > most_error * std::max(first.sd, column_spread(runs, j).sd))
-      columns.push_back(fmt::format("{} (sd {:.3g}, error {:.3g})", sensor.state, first.sd, *sensor.sd));
+      columns.push_back(sensor.state);
   }
   if (columns.empty()) return "";
   return fmt::format(
-      "launch: first values scatter little beyond the error of their sensor: {}: they hardly tell where trials begin, "
-      "and slopes of the map seem flatter than they are: can the launch be stated, its mean and sd?",
+      "launch: the first values of {} scatter little beyond their sensor's error, so that they hardly tell where "
+      "trials "
+      "begin, and slopes of the map come out too flat: can the launch be stated, its mean and sd?",
       fmt::join(columns, ", "));
 }
 

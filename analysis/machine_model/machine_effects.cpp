@@ -22,8 +22,9 @@ constexpr std::size_t fewest_trials = 5;  // whose spread is told
 // in the record.
 constexpr std::size_t most_waves = 512, fewest_waves = 128;
 constexpr double waves_apart = 0.5;
-constexpr int stretches = 6;    // of the way
-constexpr long much_rarer = 2;  // The rarer of two values has less than one step for so many of the other.
+constexpr int stretches = 6;  // of the way
+constexpr long much_rarer =
+    2;  // The second of two values is named where the first has more than so many times its steps.
 constexpr double largest_memory = 0.9;
 // Zeros of sensors are known to a share of what a column spans, or to some of its errors.
 constexpr double usual_bias = 0.1, bias_errors = 3;
@@ -130,7 +131,9 @@ class Varying {
     keep_rarer_of_two(one.candidate, [](const StepPlace& at) { return at.phase; });
     if (design_.phases.size() < 2) one.candidate.undecidable = "the runs have no column of phases with two of them";
     one.candidate.report = changed_in(design_.phases);
-    one.candidate.form_of = [](const Values& v) { return FittedForm{{0}, {v[0]}}; };  // of the first phase
+    one.candidate.form_of = [phase = one.candidate.variants.front()](const Values& v) {
+      return FittedForm{phase, {v[0]}};
+    };
     one.apply = adding([](const StepPlace& at, const Values& variant, std::size_t) {
       return at.phase == static_cast<int>(variant[0]) ? 1.0 : 0.0;
     });

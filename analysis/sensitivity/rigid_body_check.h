@@ -34,9 +34,9 @@ struct RigidBodyCheck {
 
 /// Rolls wheels of the setting with `settled` in the place of its law and the same launch, each over 512 collisions at
 /// most. The expected steps are the mean of what comes within the first 32 collisions (up to 256 of many legs), and for
-/// the share that rolls on the collisions over rests from there, when the launch is forgotten. There is no answer for
-/// wheels of so many legs that it is not. A wheel without any noise is followed once,
-/// and one that rolls on then never rests. Cost: 15 to 60 us a collision.
+/// the share that rolls on the collisions over rests from there, when the launch is forgotten. Wheels of so many legs
+/// that it is not forgotten by then have no answer. A wheel without any noise is followed once, and one that rolls on
+/// then never rests. Cost: 15 to 60 us a collision.
 RigidBodyCheck rigid_body_check(const Setting& setting, const RigidBodyOptions& options);
 
 /// Says whether two answers are within a factor of two of each other, for all that their intervals leave.

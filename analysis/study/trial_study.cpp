@@ -150,17 +150,20 @@ std::optional<Metastability> trial_study(const Problem& problem, const StudyOpti
 }
 
 void require_followed(const Problem& problem, const Metastability& study, const StudyOptions& options) {
-  constexpr double much = 0.1, beyond_first_order = 1;
+  constexpr double much = 0.1;
+  // An error of the whole, its square included, is no longer small, as both errors suppose.
+  constexpr double beyond_first_order = 1;
   constexpr std::size_t launches = 4000;
   const Estimate& memory = study.steps.memory;
   const double moved = std::max({study.steps.landing_error, std::abs(memory.lower), std::abs(memory.upper)});
   if (!problem.follow || !(moved > much)) return;
   if (moved > beyond_first_order)
     throw StatesTooCoarse(fmt::format(
-        "to first order, landings read from a table may move the expected steps by {:.2g}, and what a state at "
-        "touch-down leaves out moves them by {:.2g} to {:.2g}, such as feet that still hop or slide: from 1 on that "
-        "bounds nothing; simulate follows trials",
-        study.steps.landing_error, memory.lower, memory.upper));
+        "landings read from a table may move the expected steps by {:.2g} of themselves, and what a state at "
+        "touch-down leaves out, such as feet that still hop or slide, by {:.2g} to {:.2g}: more than {} bounds "
+        "nothing; "
+        "simulate follows trials",
+        study.steps.landing_error, memory.lower, memory.upper, beyond_first_order));
   const std::size_t most = study.steps.survival.size();
   const auto [mean, error] = mean_of(follow_trials(problem, options, 0, launches, most, false, before_trials).steps);
   const double expected = std::accumulate(study.steps.survival.begin(), study.steps.survival.end(), 0.0);

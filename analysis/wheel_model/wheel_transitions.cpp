@@ -23,7 +23,7 @@
 namespace metastable::analysis {
 
 WheelRuns runs_with_legs(const Experiment& experiment) {
-  constexpr double clearly = 3;  // in log likelihood
+  constexpr double clearly = 3;  // in log likelihood: odds of 20 to 1
   WheelRuns measured = wheel_runs(experiment);
   if (measured.legs_known) return measured;
   const bool named = std::all_of(experiment.trials.begin(), experiment.trials.end(), [&](const MeasuredTrial& trial) {
@@ -35,7 +35,12 @@ WheelRuns runs_with_legs(const Experiment& experiment) {
       .contact = stated_contact(experiment.contact, stated.noise), .tilt = ScoreTilt(0, 0), .extension = {}};
   const double with = wheel_likelihood(stated, wheel_events(stated), nominal).total();
   const double without = wheel_likelihood(measured, wheel_events(measured), nominal).total();
-  if (!(with > without + (named ? -clearly : clearly))) return measured;
+  if (!(with > without + (named ? -clearly : clearly))) {
+    if (named)
+      measured.notes.insert(measured.notes.begin(),
+                            "leg is missing: first_landing_leg is stated and not used, as the speeds contradict it");
+    return measured;
+  }
   stated.notes.insert(
       stated.notes.begin(),
       named ? "leg is missing: counted from each condition's first_landing_leg, which is stated"

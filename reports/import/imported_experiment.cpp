@@ -36,7 +36,7 @@ using TrialKey = std::pair<std::string, std::string>;  // condition, trial
 
 TrialKey key_of(const ImportedRow& row) { return {row.condition.value_or(""), row.trial.value_or("")}; }
 
-// Says whether a trial is told: a table that lacks it may say so in a word.
+// Says whether a row names its trial; NaN and NA are no names.
 bool is_trial(const std::optional<std::string>& text) {
   return text && *text != "NaN" && *text != "nan" && *text != "NAN" && *text != "NA";
 }
@@ -197,8 +197,9 @@ std::string steps_csv(const std::vector<ImportedRow>& rows, const std::vector<lo
   return csv;
 }
 
-// Counts the collisions of each trial where the file does not: its rows have to stand together. Rows that are sorted
-// by something else, a file pasted behind itself and two files that use the same numbers would make long trials.
+// Counts the collisions of each trial where the file does not. The rows of a trial have to stand together: rows that
+// are sorted by something else, a file pasted behind itself and two files that use the same numbers would make long
+// trials.
 void count_collisions(std::vector<ImportedRow>& rows, const std::vector<long>& numbers, int first, Defects& defects) {
   std::map<long, int> so_far;
   for (std::size_t i = 0; i < rows.size(); ++i) {
@@ -257,7 +258,7 @@ Imported imported_experiment(const std::string& file, std::vector<ImportedRow> r
     for (ImportedRow& row : rows) row.trial = "1";
     imported.assumed.push_back("all frames are of one trial");
   }
-  // Rows without a number of the step are in order, or refused below.
+  // Walks without a number of the step keep the order of the file; count_collisions() refuses rows that stand apart.
   if (walks && told(&ImportedRow::collision)) put_in_order(rows);
   const std::vector<long> numbers = trial_numbers(rows, options.number_trials, defects);
   defects.check();

@@ -322,7 +322,7 @@ class Runs:
 
         trial = find("trial")
         if trial is None:
-            raise InputError("runs: there is no column trial, which says of every row to which trial it belongs")
+            raise InputError("runs: there is no column trial, which says to which trial each row belongs")
         if not hasattr(trial, "__len__") or isinstance(trial, (str, bytes)):
             raise TypeError(f"trial: one for every row expected, not {trial!r} for all of them")
         self.rows = rows = len(trial)

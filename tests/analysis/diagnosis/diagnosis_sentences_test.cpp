@@ -51,7 +51,8 @@ TEST(DiagnosisSentences, OneLongTrialMayBeCut) {
       next_for(1, 244, "step").find("or cut long ones: a trial number of its own for every 24 rows makes about 10."),
       std::string::npos)
       << next_for(1, 244, "step");
-  for (const std::string& uncut : {next_for(1, 244, "collision"), next_for(2, 30, "step")})
+  for (const std::string& uncut :
+       {next_for(1, 244, "collision"), next_for(1, 244, "revolution"), next_for(1, 43, "step")})
     EXPECT_NE(uncut.find("trials like these, and diagnose them together."), std::string::npos) << uncut;
   EXPECT_NE(next_for(10, 30, "step").find("Run 14 trials like these, or longer ones,"), std::string::npos)
       << next_for(10, 30, "step");

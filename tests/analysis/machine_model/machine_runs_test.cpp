@@ -97,7 +97,7 @@ TEST_F(LookedOver, LaunchesThatAreNotThoseStatedAreNoted) {
 TEST_F(LookedOver, LaunchesThatAreNeitherStatedNorSeenAreAskedFor) {
   EXPECT_EQ(unseen_launches(machine_, runs_), "");
   machine_.observe[0].sd = 0.2;
-  EXPECT_EQ(unseen_launches(machine_, runs_).find("launch: first values scatter little beyond the error"), 0u);
+  EXPECT_EQ(unseen_launches(machine_, runs_).find("launch: the first values of x scatter little beyond"), 0u);
   machine_.launches = {{"x", 1.5, 0.1}};
   EXPECT_EQ(unseen_launches(machine_, runs_), "");
 }
