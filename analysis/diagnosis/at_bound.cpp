@@ -12,7 +12,7 @@ namespace {
 
 constexpr double at_the_end = 1e-6;  // of the range
 constexpr double inwards = 1e-3;     // of the range, to find the reported number that a parameter moves
-// A machine states the largest value of this number.
+// This number ends at Machine::most_wild, which the user states.
 constexpr std::string_view most_wild_reported = "wild_share";
 
 enum class End { none, lower, upper };

@@ -202,8 +202,8 @@ BeliefMatrix<Most> BeliefStep<Most>::mixed_differences(std::size_t trial, std::s
   return change;
 }
 
-// Returns the point of the lattice nearest to scores of zero that goes on, as its neighbours along the failing score do
-// where there is such a point.
+// Returns the point of the lattice nearest to scores of zero that goes on. Points whose neighbours along the failing
+// score go on as well come first.
 template <int Most>
 std::optional<std::size_t> BeliefStep<Most>::point_that_goes_on(std::size_t trial) const {
   const std::size_t n = lattice_.axis.points.size(), start = lattice_start(trial);
@@ -219,7 +219,7 @@ std::optional<std::size_t> BeliefStep<Most>::point_that_goes_on(std::size_t tria
   return found;
 }
 
-// About a mean that fails with all scores at zero there are no slopes. They are taken about a point of the lattice that
+// A mean that fails with all scores at zero has no slopes about it. They are taken about a point of the lattice that
 // goes on, for all such beliefs together.
 template <int Most>
 void BeliefStep<Most>::take_slopes_aside(std::span<const TransitionPlace> places, std::span<const Part> beliefs,

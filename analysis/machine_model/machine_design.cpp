@@ -20,8 +20,8 @@ namespace {
 // half of one. The numbers assume that the machine turns by less than that in a step.
 constexpr double within_turn = 1.05, full_jump = 0.7, half_jump = 0.4, least_span = 0.9;
 constexpr std::size_t fewest_jumps = 3, jumps_to_moves = 10;
-// An error of half a column's spread is a quarter of its variance, and makes slopes from there as much too flat. Where
-// the column goes far beyond its first values, its later ones tell the slopes.
+// An error of half a column's spread is a quarter of its variance, and makes slopes from there as much too flat. A
+// column that goes far beyond its first values tells the slopes by its later ones.
 constexpr double most_error = 0.5;
 constexpr std::size_t fewest_first = 5;  // So many first values tell a spread.
 

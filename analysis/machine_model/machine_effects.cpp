@@ -111,9 +111,9 @@ class Varying {
     };
   }
 
-  // Where the nominal value is fitted, either of two values of a column differs from the other by the same: one of them
-  // is enough. It is the first one unless the second is much rarer, since what is known of a parameter is known of most
-  // steps.
+  // Two values of a column differ from each other by the same, whichever is said to differ, if the nominal value is
+  // fitted: one of them is enough. It is the first one unless the second is much rarer, because what is stated of a
+  // parameter holds for most steps.
   template <class ValueAt>
   void keep_rarer_of_two(Candidate& one, ValueAt value_at) const {
     if (one.variants.size() != 2 || !(parameter_.sd > 0)) return;

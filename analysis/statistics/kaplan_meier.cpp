@@ -88,8 +88,8 @@ ExpectedSteps expected_steps(std::span<const ObservedSteps> trials, int steady_f
   const bool steady = result.steady_collisions > 0;
   const Restricted seen = restricted(trials, steady ? transient : points.back().steps);
   const double d = result.steady_rests, m = result.steady_collisions;
-  // Of Jeffreys' distribution the bound after no rest at all would be missed by up to 14 % of experiments, not 5 %; by
-  // this one, whose bound is the exact one (0.05 of such experiments see no rest), it is not.
+  // After no rest at all the bound of Jeffreys' distribution would be missed by up to 14 % of experiments, not 5 %. The
+  // distribution taken then has the exact bound: the rate at which 0.05 of such experiments see no rest.
   const boost::math::beta_distribution<> rate = d > 0 || !steady
                                                     ? boost::math::beta_distribution<>(d + 0.5, m - d + 0.5)
                                                     : boost::math::beta_distribution<>(1, m);

@@ -45,11 +45,11 @@ ChainSteps chain_steps(const markov::AnyReturnMap& map, const markov::StateSpace
 std::optional<double> asked_reach_end(const Problem& problem, const SolvedChain& solved, const markov::Launch& launch,
                                       const StudyOptions& options);
 
-/// Returns the probability of surviving so many events (no more than 100000 are followed), forwards: of any chain.
+/// Returns the probability of surviving so many events, by following the chain; no more than 100000 are followed.
 double followed_survival(const markov::SampledChain& sampled, int events);
 
-/// A scale on which probabilities of survival have intervals: ln(-ln p), on which survival of many steps moves as
-/// ln(expected steps) does; or p itself, where one of the probabilities is 0 or 1.
+/// Holds the scale on which probabilities of survival have intervals: ln(-ln p), on which survival of many steps moves
+/// as ln(expected steps) does; or p itself, if one of the probabilities is 0 or 1.
 class SurvivalScale {
  public:
   explicit SurvivalScale(std::span<const double> probabilities);

@@ -179,7 +179,8 @@ Metastability estimates(const Refinement& levels, double launch_error, const Stu
   return result;
 }
 
-// Returns the probability of surviving the course, with what the last refinement and the launch leave open.
+// Returns the probability of surviving the course, with an interval for what the last refinement and the launch leave
+// open.
 Estimate reach_end(const Problem& problem, const Level& fine, const Level& coarse, double rows_error,
                    double launch_error, const StudyOptions& options) {
   const auto told = [&](const Level& one) {

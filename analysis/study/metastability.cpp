@@ -234,8 +234,8 @@ class Study {
     return {std::move(result), *std::move(before_finest), *std::move(finest)};
   }
 
-  // Joins what the replicates on the finest cells leave open and what cells do, the step to the extrapolated value
-  // included: the probability is read off the finest chain as it is.
+  // Returns the probability as the finest chain has it. Its interval joins what the replicates on those cells leave
+  // open and what the step to an extrapolated value would move.
   static Estimate reach_end(const std::vector<ChainSteps>& pooled, const std::vector<ChainSteps>& replicates) {
     std::vector<double> all;
     for (const std::vector<ChainSteps>* some : {&pooled, &replicates})
@@ -286,7 +286,8 @@ class Study {
     return result;
   }
 
-  // Says what other draws leave open of the probability that one set of them gives, and what wider cells make of it.
+  // Returns the probability that one set of draws gives, with an interval for what other draws and wider cells make of
+  // it.
   Estimate endless_reach_end(const Metastability& result) const {
     const auto told = [&](std::size_t cells, int replicate) {
       const markov::StateSpace space = markov::covering_space(problem_.map, problem_.launch, cells, options_.seed);

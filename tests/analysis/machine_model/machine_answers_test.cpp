@@ -133,8 +133,8 @@ TEST(MachineAnswers, KnowThatFailuresComeEarly) {
   EXPECT_GT(steps.later, 1);
 }
 
-// What a parameter loses in proportion to a state is the same as the parameter with that state. The scores of either
-// promise other shares of a large gain, and both stand in the sets.
+// A parameter that is lost in proportion to a state and one that changes with that state are the same. Their scores
+// promise different shares of a large gain; both have to stand in the sets.
 TEST(MachineAnswers, RankEffectsThatActAlikeInTheSameSets) {
   Machine machine;
   machine.states = {"period"};

@@ -79,7 +79,7 @@ TEST(MachineSimulation, EveryEffectHasALikelihood) {
   for (const MachineVariation& one : machine_variations(machine, design)) check(one, one.variation.candidate);
 }
 
-// Of two values of a label the rare one is said to differ, whichever comes first: the parameter's stated value is that
+// The rare one of two values of a label is said to differ, whichever comes first: the parameter's stated value is that
 // of most steps, so that what is known of it does not pull at the size.
 TEST(MachineEffects, TheRarerOfTwoValuesIsTheOneThatDiffers) {
   const Machine machine = linear_machine(0.1);
