@@ -111,11 +111,13 @@ std::string wheel_description(const Setting& setting, Spread restitution, Spread
   return toml;
 }
 
-std::string condition_description(const std::string& id, const Setting& setting, bool launch_stated) {
+std::string condition_description(const std::string& id, const Setting& setting, bool launch_stated,
+                                  bool first_leg_stated) {
   std::string toml = fmt::format("\n[[condition]]\nid = {}\nslope_deg = {}\nramp_length_m = {}\n", toml_text(id),
                                  setting.slope_deg, setting.ramp_length);
   if (launch_stated) toml += fmt::format("initial_speed_rad_s = {}\n", toml_spread(setting.initial_speed));
-  return toml + fmt::format("first_landing_leg = {}\n", setting.first_landing_leg);
+  if (first_leg_stated) toml += fmt::format("first_landing_leg = {}\n", setting.first_landing_leg);
+  return toml;
 }
 
 ExperimentFiles experiment_files(const std::vector<SimulatedCondition>& conditions, const std::string& title,

@@ -43,10 +43,12 @@ struct ExperimentFiles {
 /// Returns the texts as the reader takes them. @param name  of the folder, for messages
 ExperimentSource source_of(const ExperimentFiles& files, const std::string& name);
 
-/// Write experiment.toml up to its [[condition]] tables, and one of those. Launches may be left unstated.
+/// Write experiment.toml up to its [[condition]] tables, and one of those. Launches and the leg that lands first may be
+/// left unstated.
 std::string wheel_description(const Setting& setting, Spread restitution, Spread friction, const std::string& title,
                               const std::vector<std::string>& comment);
-std::string condition_description(const std::string& id, const Setting& setting, bool launch_stated = true);
+std::string condition_description(const std::string& id, const Setting& setting, bool launch_stated = true,
+                                  bool first_leg_stated = true);
 std::string_view outcome_name(dynamics::Outcome outcome);
 /// Quotes a text as TOML wants it.
 std::string toml_text(const std::string& text);

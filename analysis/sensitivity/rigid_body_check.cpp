@@ -20,9 +20,9 @@ namespace metastable::analysis {
 namespace {
 
 constexpr std::uint64_t longest_roll = 512;  // collisions of a wheel
-constexpr std::uint64_t least_early =
-    32;                             // collisions: wheels of 8 legs forget their launch by the 12th in all studies
-constexpr double forgotten = 0.01;  // of what squared speeds differ by: less than wheels scatter
+// Collisions after which a launch counts as forgotten. Wheels of 8 legs forget it by the 12th in all studies.
+constexpr std::uint64_t least_early = 32;
+constexpr double forgotten = 0.01;          // of what squared speeds differ by: less than wheels scatter
 constexpr std::size_t wheels_a_batch = 16;  // wheels between two looks at what has been rolled
 constexpr double differing = 2;             // times as many or as few steps
 // The speed at which a wheel spins that hops away down the slope, for ever, times the speed sqrt(g / leg) at which

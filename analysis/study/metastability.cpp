@@ -471,8 +471,10 @@ RestThresholds rest_thresholds(const Metastability& study) {
 
 void StepsToRest::widen_reach_end(double less, double more) {
   if (!reach_end_interval) return;
-  reach_end_interval->lower = std::pow(reach_end_interval->lower, std::exp(less));
-  reach_end_interval->upper = std::pow(reach_end_interval->upper, std::exp(-more));
+  double& lower = reach_end_interval->lower;
+  double& upper = reach_end_interval->upper;
+  lower = std::isfinite(less) ? std::pow(lower, std::exp(less)) : 0;
+  upper = std::isfinite(more) ? std::pow(upper, std::exp(-more)) : 1;
 }
 
 std::optional<double> Accumulated::quantile(double level) const {

@@ -130,7 +130,8 @@ struct StepsToRest {
   /// Holds reach_end with its 95 % interval, from chains and trials as from_start's; nothing where it was not asked for
   /// or launches were followed without noise.
   std::optional<Estimate> reach_end_interval;
-  /// Widens that interval as if the logarithm of the expected steps might be so much less, and more.
+  /// Widens that interval as if the logarithm of the expected steps might be so much less, and more; to an end of [0,
+  /// 1] where that is not finite.
   void widen_reach_end(double less, double more);
   /// The state below which a launch may come to rest, when faster ones never do.
   std::optional<double> safe_state;

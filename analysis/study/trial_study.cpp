@@ -161,8 +161,7 @@ void require_followed(const Problem& problem, const Metastability& study, const 
     throw StatesTooCoarse(fmt::format(
         "landings read from a table may move the expected steps by {:.2g} of themselves, and what a state at "
         "touch-down leaves out, such as feet that still hop or slide, by {:.2g} to {:.2g}: more than {} bounds "
-        "nothing; "
-        "simulate follows trials",
+        "nothing; simulate follows trials",
         study.steps.landing_error, memory.lower, memory.upper, beyond_first_order));
   const std::size_t most = study.steps.survival.size();
   const auto [mean, error] = mean_of(follow_trials(problem, options, 0, launches, most, false, before_trials).steps);

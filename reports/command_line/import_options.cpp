@@ -133,6 +133,7 @@ void read_statement(const Options& o, ImportRequest& request) {
   if (o.given("slope") && o.given("conditions"))
     throw std::invalid_argument("--slope: is what --conditions says of each condition");
   request.setting = common_setting(o);
+  request.first_leg_stated = o.given("first-leg");
   const auto checked = [&](const char* name, const std::string& text) {
     const double slope = number_value(name, text, dynamics::slope_range(request.setting.wheel.legs()));
     return slope;

@@ -125,7 +125,7 @@ std::string description_of(const ImportRequest& request, const std::vector<Impor
   for (const auto& [id, slope] : slopes) {
     analysis::Setting setting = request.setting;
     setting.slope_deg = slope;
-    toml += analysis::condition_description(id, setting, false);
+    toml += analysis::condition_description(id, setting, false, request.first_leg_stated);
   }
   if (request.sensor_noise) toml += fmt::format("\n[sensor]\nnoise_sd_rad_s = {}\n", *request.sensor_noise);
   return toml;

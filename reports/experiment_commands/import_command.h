@@ -31,6 +31,7 @@ struct ImportRequest {
   std::string description;         ///< an experiment.toml to take; "": from what follows
   analysis::Setting setting = {};  ///< wheel, contact, ramp; its slope is of all conditions but those of `slopes`
   std::vector<std::pair<std::string, double>> slopes = {};  ///< id and slope [deg] of each condition
+  bool first_leg_stated = false;                            ///< whether somebody stated setting.first_landing_leg
   std::optional<double> sensor_noise = {};                  ///< [rad/s]
   std::optional<analysis::WalkerSetting> walker = {};  ///< of walks, where no description is given, instead of these
   std::vector<std::pair<Role, double>> errors = {};    ///< sds of measured values of walks [rad, rad/s]

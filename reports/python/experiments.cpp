@@ -141,7 +141,9 @@ HeldExperiment from_arrays(const py::list& ids, const py::list& settings, const 
     if (i == 0)
       source.experiment_toml =
           analysis::wheel_description(setting, setting.restitution, setting.friction, given.text("title"), {});
-    source.experiment_toml += analysis::condition_description(ids[i].cast<std::string>(), setting);
+    // A first leg of 0 is the default, which states nothing.
+    source.experiment_toml +=
+        analysis::condition_description(ids[i].cast<std::string>(), setting, true, setting.first_landing_leg != 0);
   }
   if (given.given("rate_hz") || given.given("noise_sd")) source.experiment_toml += "\n[sensor]\n";
   if (given.given("rate_hz")) source.experiment_toml += fmt::format("rate_hz = {}\n", given.number("rate_hz"));

@@ -78,6 +78,7 @@ TEST_F(Import, NumbersNamesOfTrialsAndStatesTheWheelByOptions) {
   EXPECT_EQ(read.trials[0].collisions.size(), 2u);
   EXPECT_EQ(read.conditions[read.trials[1].condition].id, "slow");
   EXPECT_EQ(read.sensor.noise_sd, 0.01);
+  EXPECT_FALSE(read.conditions[0].first_leg_stated);
   EXPECT_NEAR(read.trials[2].collisions[0].omega_minus, 331 * std::numbers::pi / 180, 1e-12);
 
   expect_refused(import(stated({"--slope", "9.59"})),
