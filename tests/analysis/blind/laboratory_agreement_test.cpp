@@ -138,12 +138,13 @@ TEST(LaboratoryAgreement, ExpectedStepsKnowWhatTheCollisionBeforeWas) {
 }
 
 // Under `settled` a wheel also rests because its foot slides too far, and torques raise the friction that stops it.
+// Each effect is so large that a model which forgets it expects 2 to 4 times the steps, which is outside what is
+// allowed.
 TEST(LaboratoryAgreement, ExpectedStepsAreThoseCountedUnderSettled) {
   const Setting base = slow_launches(rigid_setting(), 9.59, 5);
-  for (const char* text :
-       {"rolling_resistance:torque_n_m=0.032", "axle_drag_viscous:n_m_s=0.016", "air_drag:n_m_s2=0.003",
-        "slope_offset:offset_deg=-0.8", "leg_contact:leg=5,friction_ratio=0.9"})
-    expect_steps(base, dynamics::effect_from_text(text, true_values), 400);
+  for (const char* text : {"rolling_resistance:torque_n_m=0.032", "axle_drag_viscous:n_m_s=0.016",
+                           "air_drag:n_m_s2=0.01", "leg_contact:leg=5,friction_ratio=0.85"})
+    expect_steps(base, dynamics::effect_from_text(text, true_values), 200);
 }
 
 // An effect of the catalogue stands in four places. Forgotten in the last two it would be called absent without notice;

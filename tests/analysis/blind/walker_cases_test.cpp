@@ -20,7 +20,8 @@ namespace {
 
 constexpr Spread slope{3, 0.35};
 
-Walks laboratory_walks_with(const std::vector<dynamics::Effect>& effects, std::size_t trials = 24) {
+Walks laboratory_walks_with(const std::vector<dynamics::Effect>& effects, std::size_t trials,
+                            std::size_t longest = 10) {
   WalkStatement statement{"walks", {}, {}};
   statement.walker.setting = {Walker::compass, slope.mean, slope.sd, dynamics::Terrain::fresh};
   WalkerReality reality;
@@ -28,7 +29,7 @@ Walks laboratory_walks_with(const std::vector<dynamics::Effect>& effects, std::s
   reality.launch_spread = 0.02;
   WalkOptions options;
   options.trials = trials;
-  options.longest = 10;
+  options.longest = longest;
   options.seed = 7;
   options.threads = 1;
   const dynamics::WalkerLaboratory laboratory = walker_laboratory(statement.walker.setting, reality, options);
@@ -81,11 +82,19 @@ TEST(WalkerAgreement, FormsAreTheInverseOfReports) {
   }
 }
 
+// A few walks show what changes every step, and the first steps show a launch. What is rare or small needs many.
+Walks walks_that_show(const dynamics::Effect& effect) {
+  if (effect.id.starts_with("launch")) return laboratory_walks_with({effect}, 48, 3);
+  const bool clear =
+      effect.id.starts_with("hip") || effect.id.starts_with("leg") || effect.id.starts_with("sensor_noise");
+  return laboratory_walks_with({effect}, effect.id == "outliers" ? 48 : clear ? 8 : 24);
+}
+
 // The laboratory's walks are likeliest under the model with the effect that is in them: more than without it and more
 // than at a third or three times its size.
 TEST(WalkerAgreement, EveryEffectIsFoundAtItsSize) {
   for (const dynamics::Effect& effect : visible_effects()) {
-    const Walks walks = laboratory_walks_with({effect}, effect.id == "outliers" ? 48 : 24);  // Rare steps are counted.
+    const Walks walks = walks_that_show(effect);
     const auto model = machine_transitions(walks.machine, walks.runs);
     const EffectTerm term = fitted_term(*model, effect);
     const auto likelihood = [&](double size) {

@@ -37,6 +37,25 @@ TEST(DiagnosisSentences, SayWhatAnEffectClosesBesideOtherParameters) {
             "when it is added to the recalibrated model.");
 }
 
+TEST(DiagnosisSentences, SayWhatStandsInThePlaceOfTheUnnamed) {
+  Diagnosis d;
+  d.verdict = Verdict::partly_explained;
+  d.data.step_name = "collision";
+  d.causes.p_unnamed = 0.93;
+  d.causes.unnamed_share = 0.108;
+  const auto stays = [&] {
+    std::string said;
+    for (const std::string& sentence : sentences(d))
+      if (sentence.find("without a name") < 20 || sentence.starts_with("In its place")) said += sentence;
+    return said;
+  };
+  EXPECT_EQ(stays(), "Something without a name stays, 11 % of the gap, with probability 0.93.");
+  d.causes.stand_ins = {"contact_memory", "trial_spread"};
+  EXPECT_EQ(stays(),
+            "Something without a name is at work, too, 11 % of the gap, with probability 0.93."
+            "In its place the best model has contact_memory and trial_spread, too unlikely to be named.");
+}
+
 std::string next_for(std::size_t trials, std::size_t steps, const std::string& step_name) {
   Diagnosis d;
   d.verdict = Verdict::unexplained;

@@ -194,12 +194,18 @@ TEST(Diagnosis, OneVariationStandsInThePlaceOfTwoEffects) {
                                                .seed = 38});
   DiagnosisOptions options = quick();
   options.catalogue = {"speed_dependent_restitution", "speed_dependent_friction", "slope_offset", "leg_contact"};
-  const Diagnosis d = decided(*wheel_transitions(experiment), options);
+  const Diagnosis d = diagnose(*wheel_transitions(experiment), options);
   std::vector<std::string> names;
   for (const AtWork& one : d.causes.at_work)
     if (one.probability >= options.rules.least_at_work) names.push_back(one.name);
   EXPECT_EQ(names, std::vector<std::string>{"slope_offset"});
   EXPECT_EQ(d.verdict, Verdict::partly_explained);
+  // The share without a name is that which the two close, and more than the best model leaves. With the slope's share it
+  // is about the whole.
+  EXPECT_EQ(d.causes.stand_ins.size(), 2U);
+  ASSERT_TRUE(d.causes.unnamed_share && d.causes.at_work.front().closes_beside);
+  EXPECT_GT(*d.causes.unnamed_share, 2 * (1 - *d.shrinkage.measures.front().closed));
+  EXPECT_NEAR(*d.causes.unnamed_share + d.causes.at_work.front().closes_beside->value, 1, 0.3);
 }
 
 // Friction rises and falls over the trials, as no effect does: of all that it may vary by, the swing has most evidence.

@@ -175,9 +175,9 @@ TEST(Verdict, PairsAreAlikeWhereWhatTheyDoNotShareIs) {
 }
 
 // Where something without a name stays only effects that the field calls by one name stand together: a torque is at
-// work, whichever it is, but not one of two rivals that have nothing in common.
+// work, whichever it is, but not one of two rivals that have nothing in common. Where nothing stays one of those is.
 TEST(AtWork, OfOneNameAreOneGroup) {
-  const auto with = [](const std::string& rival) {
+  const auto with = [](const std::string& rival, double unnamed = 1e6) {
     std::vector<Cause> ranked(2);
     ranked[0].effects = {"bounce", "slope_offset"};
     ranked[1].effects = {"bounce", rival};
@@ -187,13 +187,14 @@ TEST(AtWork, OfOneNameAreOneGroup) {
     }
     Diagnosis::Data data = enough_data();
     data.groups = {{"a constant torque", {"slope_offset", "rolling_resistance"}}};
-    return judged(ranked, {0, 0, 1e6}, a_gap, data).causes.at_work;
+    return judged(ranked, {0, 0, unnamed}, a_gap, data).causes.at_work;
   };
   const std::vector<AtWork> torque = with("rolling_resistance");
   ASSERT_EQ(torque.size(), 2u);
   EXPECT_EQ(torque[1].name, "a constant torque");
   EXPECT_GT(torque[1].probability, 0.9);
   EXPECT_LT(with("trial_drift")[1].probability, 0.7);
+  EXPECT_EQ(with("trial_drift", 0)[1].effects, (std::vector<std::string>{"slope_offset", "trial_drift"}));
 }
 
 // Rivals of which none is likely enough by itself, and which a design would tell apart, are at work as a group: the gap

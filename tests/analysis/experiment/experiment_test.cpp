@@ -137,6 +137,9 @@ TEST(Experiment, NamesWhatIsWrongWithTheDescription) {
   EXPECT_EQ(of("hub_mass_kg = 1.39\n", ""), "experiment.toml:1:1: missing key 'wheel.hub_mass_kg'");
   EXPECT_EQ(of("1.39", "-1"), "experiment.toml:2:15: wheel.hub_mass_kg: -1 is outside [1e-06, 1e+06]");
   EXPECT_EQ(of("1.39", "\"1.39\""), "experiment.toml:2:15: wheel.hub_mass_kg: a number is expected");
+  const std::string grams = of("1.39", "1390");
+  EXPECT_NE(grams.find("wheel.hub_mass_kg: 1390 kg between the tips of legs of"), std::string::npos) << grams;
+  EXPECT_TRUE(grams.ends_with("would be denser than any metal; grams are suspected")) << grams;
   EXPECT_EQ(of("0.151", "nan"), "experiment.toml:3:24: wheel.leg_lengths_m[1]: nan is outside [0.001, 100]");
   EXPECT_EQ(of("[0.15, 0.151, 0.15, 0.15]", "[0.15]"),
             "experiment.toml:3:17: wheel.leg_lengths_m: 1 legs are outside 3..1000");
@@ -304,7 +307,7 @@ TEST(Experiment, ReadsAMillionRowsQuickly) {
   for (int t = 1; t <= trials; ++t)
     for (int c = 1; c <= collisions; ++c)
       fmt::format_to(std::back_inserter(rows), "a,{},{},{},{:.6f},{:.6f},{:.9g},{:.9g}\n", t, c, c % 4, 0.2 * c,
-                     0.1165 * c, 8 + 0.001 * t / c, 7 + 0.001 * t / c);
+                     0.2125 * c, 8 + 0.001 * t / c, 7 + 0.001 * t / c);
   const ExperimentSource text = source(replaced(description, "3.66", "36.6"), rows);
   const auto start = std::chrono::steady_clock::now();
   const Experiment e = parse_experiment(text);

@@ -69,12 +69,29 @@ TEST_F(PlausibilityTest, SuspectsOtherUnits) {
   expect_suspected("inches", [](C& c) { c.position /= 0.0254; });
 }
 
+// A frame rate of half its value looks like no unit, and a diameter in the place of a length was explained by inertia.
+TEST_F(PlausibilityTest, SuspectsFrameRatesAndDiameters) {
+  using C = dynamics::TrialCollision;
+  expect_suspected("speeds doubled by a misstated frame rate",
+                   [](C& c) { c.omega_minus *= 2, c.omega_plus *= 2, c.time /= 2; });
+  setting_.law = dynamics::Law::published;  // slower
+  trials_ = simulate_trials(setting_, {.trials = 10, .seed = 3});
+  expect_suspected("speeds halved by a misstated frame rate",
+                   [](C& c) { c.omega_minus /= 2, c.omega_plus /= 2, c.time *= 2; });
+  for (double& leg : setting_.wheel.leg_length) leg *= 2;
+  const std::vector<std::string> lines = refused(trials_);
+  ASSERT_FALSE(lines.empty());
+  EXPECT_NE(lines.back().find("are wheel.leg_lengths_m all its legs, from the hub to the tips"), std::string::npos)
+      << lines.back();
+}
+
 TEST_F(PlausibilityTest, NamesTheFirstPositionBeyondTheRamp) {
   std::vector<dynamics::Trial> trials = trials_;
   trials[2].collisions.back().position = 5;
   const std::vector<std::string> lines = refused(trials);
   ASSERT_EQ(lines.size(), 1u);
-  EXPECT_NE(lines.front().find("position_m: goes up to 5 m, where the ramp ends at 3.66 m"), std::string::npos)
+  EXPECT_NE(lines.front().find("position_m: goes up to 5 m, where the ramp ends at 3.66 m; its steps are those of the"),
+            std::string::npos)
       << lines.front();
 }
 

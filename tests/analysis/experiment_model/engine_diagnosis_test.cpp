@@ -65,7 +65,7 @@ void expect_steps(const metastable::test::EngineRun& run, const char* effect, do
 
 // A torque at the axle makes feet slide further, so that a friction which stops them without it does not stop them.
 TEST(EngineDiagnosis, TorquesMakeTheWheelRestAsOftenAsTheModelSays) {
-  expect_steps({.trials = 60, .seed = 5, .viscous_drag = 0.016}, "axle_drag_viscous", 0.016);
+  expect_steps({.trials = 30, .seed = 5, .viscous_drag = 0.016}, "axle_drag_viscous", 0.016);
 }
 
 }  // namespace

@@ -51,6 +51,16 @@ TEST(WheelTransitions, FitsFindTheSizesOfEffects) {
   }
 }
 
+// Drags are fitted with either sign, and one that drives is told for what it is not.
+TEST(WheelTransitions, SayThatNoDragDrivesAWheel) {
+  const auto design = wheel_transitions(test::wheel_design(4, 14));
+  const auto said = [&](const char* id, double value) {
+    return design->size_in_words(std::vector{term(*design, id, {}, {value})});
+  };
+  EXPECT_EQ(said("axle_drag_viscous", 0.01) + said("trial_drift", -0.1), "");
+  EXPECT_TRUE(said("axle_drag_viscous", -0.01).starts_with("A negative axle_drag_viscous would drive the wheel"));
+}
+
 // Constant contacts leave speeds that scatter by the noise alone, and a recalibration finds nothing else. Where they
 // scatter all the same, it finds by how much.
 TEST(WheelTransitions, OfConstantContactsTakeTheNoiseForWhatItIs) {

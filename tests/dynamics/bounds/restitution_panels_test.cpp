@@ -4,8 +4,7 @@
 
 #include <gtest/gtest.h>
 
-#include <boost/math/special_functions/erf.hpp>
-#include <boost/multiprecision/cpp_bin_float.hpp>
+#include "tests/dynamics/normal_digits.h"
 
 namespace metastable::dynamics {
 namespace {
@@ -14,8 +13,8 @@ namespace {
 using LongReal = boost::multiprecision::number<boost::multiprecision::cpp_bin_float<120>>;
 
 bool encloses(const Interval& i, const LongReal& x) { return LongReal(i.lower) <= x && x <= LongReal(i.upper); }
-LongReal below(const LongReal& z) { return boost::math::erfc(-z / sqrt(LongReal(2))) / 2; }
-LongReal bump(const LongReal& z) { return exp(-z * z / 2) / sqrt(2 * boost::math::constants::pi<LongReal>()); }
+LongReal below(const LongReal& z) { return test::normal_tail_digits(LongReal(-z)); }
+LongReal bump(const LongReal& z) { return test::normal_density_digits(z); }
 
 TEST(RestitutionPanels, EncloseMassesAndMoments) {
   for (const auto& [mean, sd] :

@@ -283,7 +283,7 @@ TEST(DiagnosisText, SaysSoWhenNoCellIsBeyondChance) {
 TEST(DiagnosisTables, CauseOfAListShowsItsValuesWithoutIntervals) {
   const Table table = causes_table(sample());
   EXPECT_EQ(std::get<std::string>(table.rows.at(1).back().value()),
-            "leg_lengths_m 0.15; 0.16 + offset_deg 0.20 (0.10 to 0.30)");
+            "leg_lengths_m 0.1500; 0.1600 + offset_deg 0.20 (0.10 to 0.30)");
 }
 
 TEST(DiagnosisFigures, MapHasAPhaseAFigureAndRowsFromTheTop) {

@@ -50,6 +50,14 @@ class Pendulum(unittest.TestCase):
         low, high = answer.contact.interval_90["decay"]
         self.assertTrue(low < 0.965 < high)
 
+    def test_readings_that_are_off_one_by_one_leave_the_parameters_as_they_are_stated(self):
+        data = swung()
+        data["swing_rad"][7::61] += 0.02 * (-1.0) ** np.arange(16)
+        machine = pendulum(most_wild=0.05)
+        answer = metastable.diagnose(metastable.runs(machine, data), machine)
+        self.assertEqual(answer.verdict, "recalibrate")
+        self.assertRegex(answer.sentences[1], r"^Nothing but the share of wild rows, 0\.0[12]\d*, differs from the model as given")
+
     def test_a_parameter_that_is_stated_too_surely_is_said_with_its_sds(self):
         answer = diagnosed(pendulum(parameters={"decay": (0.99, 0.001), "scatter_rad": (0.003, 0.003, 1e-5, 0.1)}))
         self.assertEqual(answer.verdict, "recalibrate")
@@ -75,6 +83,43 @@ class Pendulum(unittest.TestCase):
         machine = pendulum(inputs=["temperature"])
         data = dict(swung(trials=10), temperature=np.full(240, 20.0))
         self.assertEqual(repr(metastable.runs(machine, data)), "<metastable.Runs: 10 trials, 240 rows>")
+
+
+def spinner(angles, wraps):
+    def step(state, noise, p):
+        angle = state[:, 0]
+        angle = angle + p["advance"] + p["pull"] * np.sin(2 * angle) + p["scatter"] * noise[:, 0]
+        return (angle % (2 * np.pi) if wraps else angle)[:, None], np.zeros(len(state), bool)
+    return metastable.machine(step, states=["angle_rad"], noise=1, effects={"pull": {"pull": (0, -0.5, 0.5)}},
+                              parameters={"advance": (0.9, 0.05), "scatter": (0.1, 0.02, 0, 1)},
+                              sensor={"angle_rad": 0.02}, angles=angles)
+
+
+class Angles(unittest.TestCase):
+    rng = np.random.default_rng(5)
+    trial, angle = np.repeat(np.arange(20), 12), np.zeros(240)
+    for row in range(240):
+        before = angle[row - 1]
+        angle[row] = 6 * rng.random() if row % 12 == 0 else before + 0.9 + 0.2 * np.sin(2 * before) + 0.1 * rng.normal()
+
+    def test_that_wrap_get_the_answer_of_those_that_go_on(self):
+        answers = [metastable.diagnose(metastable.runs(machine, trial=self.trial, angle_rad=angle), machine)
+                   for machine, angle in [(spinner((), False), self.angle),
+                                          (spinner("angle_rad", True), self.angle % (2 * np.pi))]]
+        for answer in answers:
+            self.assertEqual((answer.verdict, answer.at_work[0].effects), ("explained", ("pull",)))
+            low, high = answer.at_work[0].interval_90.pull
+            self.assertLess(abs(answer.at_work[0].parameters.pull - 0.2), high - low)
+        for ours, other in zip(*(answer.at_work[0].interval_90.pull for answer in answers)):
+            self.assertAlmostEqual(ours, other, 6)
+
+    def test_that_are_lost_for_a_while_are_refused(self):
+        angle = self.angle.copy()
+        angle[27:29] = np.nan
+        with self.assertRaisesRegex(metastable.InputError, "^angles: angle_rad is missing in trial 2, row 4, and comes back"):
+            metastable.runs(spinner("angle_rad", True), trial=self.trial, angle_rad=angle)
+        with self.assertRaisesRegex(metastable.InputError, '^angles: "roll" is none of the states angle_rad'):
+            spinner("roll", True)
 
 
 class Failing(unittest.TestCase):

@@ -1,0 +1,124 @@
+#include "analysis/experiment/stance_check.h"
+
+#include <gtest/gtest.h>
+
+#include <functional>
+#include <string>
+#include <vector>
+
+#include "analysis/experiment/experiment_folder.h"
+#include "tests/analysis/settings.h"
+
+namespace metastable::analysis {
+namespace {
+
+using Rows = std::vector<MeasuredCollision>;
+
+Experiment rolled(dynamics::Law law) {
+  Setting setting = paper_setting(9.59, false);
+  setting.law = law;
+  setting.restitution = {0.54, 0.045};
+  setting.friction = {0.352, 0.043};
+  return parse_experiment(
+      source_of(experiment_files(setting, simulate_trials(setting, {.trials = 20, .seed = 3}), "t", {}), ""));
+}
+
+Experiment spoilt(const std::function<void(Rows&)>& spoil, dynamics::Law law = dynamics::Law::published) {
+  Experiment experiment = rolled(law);
+  for (MeasuredTrial& trial : experiment.trials) spoil(trial.collisions);
+  return experiment;
+}
+
+std::string refusal(const Experiment& experiment) {
+  Defects defects;
+  check_stances(experiment, "collisions.csv", defects);
+  try {
+    defects.check();
+  } catch (const InputError& error) {
+    return error.what();
+  }
+  return "";
+}
+
+std::string question(const Experiment& experiment) {
+  const std::vector<std::string> all = questions_on_stances(experiment);
+  EXPECT_LE(all.size(), 1u);
+  return all.empty() ? "" : all.front();
+}
+
+void scale(Rows& rows, double speeds, double times) {
+  for (MeasuredCollision& c : rows) {
+    c.omega_minus *= speeds;
+    if (c.omega_plus) *c.omega_plus *= speeds;
+    *c.time *= times;
+  }
+}
+
+TEST(StanceCheck, TakesWhatWheelsDo) {
+  for (const dynamics::Law law :
+       {dynamics::Law::published, dynamics::Law::coulomb, dynamics::Law::plastic, dynamics::Law::settled}) {
+    EXPECT_EQ(refusal(rolled(law)), "") << static_cast<int>(law);
+    EXPECT_EQ(question(rolled(law)), "") << static_cast<int>(law);
+  }
+}
+
+// It was diagnosed as a friction or a restitution that depends on speed, and expected steps came out 1000 times off.
+TEST(StanceCheck, SuspectsSpeedsAfterThatStandARowOff) {
+  const std::string early = refusal(spoilt([](Rows& rows) {
+    for (std::size_t k = 0; k + 1 < rows.size(); ++k) rows[k].omega_plus = rows[k + 1].omega_plus;
+    rows.back().omega_plus.reset();
+  }));
+  EXPECT_NE(early.find("omega_plus_rad_s: its values are suspected to stand one row early"), std::string::npos)
+      << early;
+  const std::string late = refusal(spoilt([](Rows& rows) {
+    for (std::size_t k = rows.size() - 1; k > 0; --k) rows[k].omega_plus = rows[k - 1].omega_plus;
+    rows.front().omega_plus.reset();
+  }));
+  EXPECT_NE(late.find("one row late"), std::string::npos) << late;
+}
+
+// A frame rate stated at twice its value doubles speeds and halves times, which agree: gravity tells.
+TEST(StanceCheck, RefusesSpeedsThatGravityDoesNotGive) {
+  const std::string doubled = refusal(spoilt([](Rows& rows) { scale(rows, 2, 0.5); }));
+  EXPECT_NE(doubled.find("speeds 2 times too large are suspected"), std::string::npos) << doubled;
+  EXPECT_EQ(refusal(spoilt([](Rows& rows) { scale(rows, 1.1, 1 / 1.1); })), "");
+  const std::string more = question(spoilt([](Rows& rows) { scale(rows, 1.3, 1 / 1.3); }));
+  EXPECT_NE(more.find("or more what gravity gives"), std::string::npos) << more;
+  Experiment percent = rolled(dynamics::Law::published);
+  percent.conditions[0].slope_deg = 16.9;
+  EXPECT_NE(question(percent).find("or less what gravity gives"), std::string::npos) << question(percent);
+}
+
+// An inertia that is off was named with probability 1.
+TEST(StanceCheck, AsksAboutSpeedsAndTimesThatContradictEachOther) {
+  for (const double by : {0.9, 0.95, 1.05, 1.1}) {
+    const std::string speeds = question(spoilt([&](Rows& rows) { scale(rows, by, 1); }));
+    EXPECT_NE(speeds.find("contradict each other"), std::string::npos) << by << ' ' << speeds;
+  }
+  EXPECT_NE(question(spoilt([](Rows& rows) { scale(rows, 1, 2); })).find("contradict each other"), std::string::npos);
+  EXPECT_EQ(question(spoilt([](Rows& rows) { scale(rows, 1.05, 1 / 1.05); })), "");
+}
+
+TEST(StanceCheck, AsksAboutClocksThatJump) {
+  Experiment experiment = rolled(dynamics::Law::published);
+  for (std::size_t k = 4; k < experiment.trials[2].collisions.size(); ++k)
+    *experiment.trials[2].collisions[k].time += 10;
+  const std::string asked = question(experiment);
+  EXPECT_NE(asked.find("1 of "), std::string::npos) << asked;
+  EXPECT_NE(asked.find("before collision 5 of trial 3: does the clock jump"), std::string::npos) << asked;
+}
+
+// Trials with a collision that nobody noted were explained by noise of the sensor.
+TEST(StanceCheck, AsksAboutCollisionsThatAreMissing) {
+  Experiment experiment = rolled(dynamics::Law::published);
+  Rows& rows = experiment.trials[1].collisions;
+  rows.erase(rows.begin() + 6);
+  for (std::size_t k = 0; k < rows.size(); ++k) rows[k].number = static_cast<int>(k) + 1;
+  EXPECT_NE(question(experiment).find("before collision 7 of trial 2: is a collision missing?"), std::string::npos);
+  for (MeasuredTrial& trial : experiment.trials)
+    for (MeasuredCollision& c : trial.collisions) c.position.reset();
+  EXPECT_NE(question(experiment).find("before collision 7 of trial 2: does the clock jump"), std::string::npos);
+}
+
+}  // namespace
+}  // namespace metastable::analysis
