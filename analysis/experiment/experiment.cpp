@@ -12,6 +12,7 @@
 #include "analysis/experiment/experiment_notes.h"
 #include "analysis/experiment/experiment_toml.h"
 #include "analysis/experiment/plausibility.h"
+#include "analysis/experiment/stance_check.h"
 #include "analysis/experiment/trial_index.h"
 
 namespace metastable::analysis {
@@ -265,8 +266,10 @@ Experiment parse_experiment(const ExperimentSource& source) {
     }
   }
   experiment.sensor.last_digit = last_digit(experiment);
-  if (readable && experiment.system == System::rimless_wheel)
+  if (readable && experiment.system == System::rimless_wheel) {
     check_plausible(experiment, collisions_file, collision_rows.lines(), defects);
+    check_stances(experiment, collisions_file, defects);
+  }
   if (readable) check_copies(experiment, collisions_file, collision_rows.lines(), defects);
   defects.check();
   std::ranges::sort(experiment.trials, {}, &MeasuredTrial::number);

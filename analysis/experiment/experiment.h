@@ -124,7 +124,8 @@ Experiment parse_description(const ExperimentSource& source);
 /// negative; collisions of a trial in order without repeat or gap, legs landing one after the other, time and position
 /// rising; a trial of one condition only, which experiment.toml knows; the same trials in collisions.csv and
 /// trials.csv; speeds, times and positions that a wheel of these legs on this ramp can have, and no trial twice
-/// (plausibility.h). O(rows log trials). @throws InputError with the first 20 defects, each with file, line and column
+/// (plausibility.h, stance_check.h). O(rows log trials).
+/// @throws InputError with the first 20 defects, each with file, line and column
 Experiment parse_experiment(const ExperimentSource& source);
 
 /// Does read_source() and parse_experiment().

@@ -3,8 +3,10 @@
 #include <fmt/format.h>
 
 #include <string_view>
+#include <utility>
 
 #include "analysis/experiment/rolling_speeds.h"
+#include "analysis/experiment/stance_check.h"
 
 namespace metastable::analysis {
 namespace {
@@ -47,6 +49,8 @@ std::vector<std::string> notes_on(const Experiment& experiment) {
   if (experiment.system == System::rimless_wheel) missing(experiment.columns.position, "position_m");
   missing(experiment.columns.omega_plus, "omega_plus_rad_s");
   if (!experiment.columns.outcomes) notes.push_back("There is no trials.csv: how the trials ended is not known.");
+  if (experiment.system == System::rimless_wheel)
+    for (std::string& question : questions_on_stances(experiment)) notes.push_back(std::move(question));
   for (std::size_t c = 0; c < experiment.conditions.size(); ++c) {
     const Condition& condition = experiment.conditions[c];
     if (experiment.system == System::rimless_wheel) note_odd_speeds(experiment, c, notes);

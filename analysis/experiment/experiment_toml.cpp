@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <numbers>
 #include <optional>
 #include <set>
 #include <stdexcept>
@@ -161,6 +162,15 @@ class Keys {
   std::set<std::string, std::less<>> known_;
 };
 
+// Returns why no wheel has this mass, or "": the hub lies between the tips of the legs.
+std::string density_objection(const dynamics::Wheel& wheel) {
+  constexpr double densest = 22600;  // kg/m^3, of osmium
+  const double reach = *std::ranges::max_element(wheel.leg_length);
+  if (wheel.hub_mass < densest * 4.0 / 3 * std::numbers::pi * reach * reach * reach) return {};
+  return fmt::format("{} kg between the tips of legs of {} m would be denser than any metal; grams are suspected",
+                     wheel.hub_mass, reach);
+}
+
 void read_wheel(Keys& root, dynamics::Wheel& wheel, dynamics::Law law, const Defects& defects) {
   const std::size_t before = defects.count();
   std::optional<Keys> keys = root.table("wheel", true);
@@ -187,6 +197,7 @@ void read_wheel(Keys& root, dynamics::Wheel& wheel, dynamics::Law law, const Def
     if (!objection.empty()) keys->report(*keys->find(key, true), fmt::format("wheel.{}: {}", key, objection));
   };
   if (defects.count() == before) {
+    object("hub_mass_kg", density_objection(wheel));
     object("inertia_kg_m2", dynamics::inertia_objection(wheel));
     object("radius_of_gyration_m", dynamics::gyration_objection(wheel, law));
     object("tip_radius_m", dynamics::tip_objection(wheel));

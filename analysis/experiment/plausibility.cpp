@@ -21,10 +21,14 @@ namespace {
 constexpr double turn = 2 * std::numbers::pi;
 
 // The mean speed of a step over the speed at its end is 0.56 to 0.72 in the middle of what engines and the virtual
-// laboratory roll, at most 0.96, and falls as a wheel comes slowly over its foot; a step is a chord, up to 1.4 where
-// feet slide. Units differ by more.
-constexpr double least_time_share = 0.15, most_time_share = 1.5, least_step_share = 0.4, most_step_share = 2.5;
-constexpr double ramp_room = 1.02;  // a ramp is measured to two per cent
+// laboratory roll, at most 0.96, and falls as a wheel comes slowly over its foot. Units differ by more.
+constexpr double least_time_share = 0.15, most_time_share = 1.5;
+// A step is a chord, up to 1.4 where feet slide, 1.00 to 1.04 in the middle of what engines roll. Lengths of legs that
+// are diameters make it half of one, two legs of eight that are not listed 0.76.
+constexpr double least_step_share = 0.85, most_step_share = 1.6;
+constexpr double end_room = 2.5;       // chords by which a position may lie beyond the ramp's end
+constexpr double most_lifting = 1.25;  // wheels whose feet lift at most steps are not rolling
+constexpr double ramp_room = 1.02;     // a ramp is measured to two per cent
 
 // A wheel that turns about its foot has the energy J omega^2 / 2, J = I + M L^2 of that foot. A collision adds none, so
 // that it keeps at most the square root of the two J's ratio of the speed, which is never more than the longest leg
@@ -42,8 +46,9 @@ struct Unit {
   std::string_view name;
   double too_large;  // by how much a number in it is
 };
-constexpr Unit speed_units[] = {
-    {"degrees per second", 360 / turn}, {"revolutions per minute", 60 / turn}, {"revolutions per second", 1 / turn}};
+constexpr Unit speed_units[] = {{"degrees per second", 360 / turn}, {"revolutions per minute", 60 / turn}};
+// Speeds of half their size lie too near to those in rev/s for one of the two to be named alone.
+constexpr Unit slow_units[] = {{"revolutions per second", 1 / turn}, {"speeds halved by a misstated frame rate", 0.5}};
 constexpr Unit time_units[] = {
     {"milliseconds", 1e3}, {"microseconds", 1e6}, {"minutes", 1.0 / 60}, {"nanoseconds", 1e9}};
 constexpr Unit length_units[] = {
@@ -117,12 +122,13 @@ class Plausible {
   void speeds() {
     Odd fast;
     std::vector<double> later;
-    double slowest = 0, fastest = 0;
+    double slowest = 0, fastest = 0, too_fast = 0;
     each([&](std::size_t t, std::size_t i, const MeasuredCollision& c) {
       const RollingSpeeds bounds = rolling_speeds(experiment_, experiment_.trials[t].condition);
       for (const std::optional<double>& speed : {std::optional(c.omega_minus), c.omega_plus})
         if (speed && std::abs(*speed) > bounds.fastest) fast.add(lines_[t][i], *speed), fastest = bounds.fastest;
       if (i > 0) later.push_back(c.omega_minus), slowest = std::max(slowest, bounds.slowest);
+      too_fast = std::max({too_fast, most_lifting * bounds.lifting, fastest_steady(experiment_.trials[t].condition)});
     });
     if (fast.count > 0)
       return report(fast,
@@ -131,13 +137,22 @@ class Plausible {
                                 fast.worst, fastest, suspected(speed_units, typical_speed(), slowest, fastest / 3)));
     if (later.size() < 3) return;
     const double middle = median(later);
+    if (middle > too_fast) {
+      defects_.add(
+          file_, {1, 1},
+          fmt::format("omega_minus_rad_s: half of the speeds from collision 2 on lie above {:.3g} rad/s, where "
+                      "the feet of this wheel lift off at {:.3g} rad/s: speeds doubled by a misstated frame "
+                      "rate are suspected",
+                      middle, rolling_speeds(experiment_, 0).lifting));
+      return;
+    }
     if (middle >= slowest) return;
     defects_.add(
         file_, {1, 1},
         fmt::format("omega_minus_rad_s: half of the speeds from collision 2 on lie below {:.3g} rad/s, where a "
                     "wheel that has come over a leg on this ramp reaches {:.3g} rad/s{}",
                     middle, slowest / RollingSpeeds::room,
-                    suspected(speed_units, middle, slowest, rolling_speeds(experiment_, 0).fastest)));
+                    suspected(slow_units, middle, slowest, rolling_speeds(experiment_, 0).lifting)));
   }
 
   // A wheel turns by a leg angle from collision to collision, at speeds below those before and behind.
@@ -163,24 +178,31 @@ class Plausible {
     steps([&](std::size_t, std::size_t, const MeasuredCollision& last, const MeasuredCollision& next) {
       if (last.position && next.position) share.push_back((*next.position - *last.position) / chord);
     });
-    if (const double middle = share.empty() ? 1 : median(share); middle < least_step_share || middle > most_step_share)
+    const double middle = share.empty() ? 1 : median(share);
+    const bool of_feet = middle >= least_step_share && middle <= most_step_share;
+    if (!of_feet) {
+      const std::string unit = suspected(length_units, middle, least_step_share, most_step_share);
       defects_.add(
           file_, {1, 1},
           fmt::format("position_m: half of the steps are {:.4g} m or longer, where the feet of this wheel are "
                       "{:.4g} m apart{}",
-                      middle * chord, chord, suspected(length_units, middle, least_step_share, most_step_share)));
+                      middle * chord, chord,
+                      unit.empty() ? "; are wheel.leg_lengths_m all its legs, from the hub to the tips?" : unit));
+    }
     Odd beyond;
     double end = 0;
     each([&](std::size_t t, std::size_t i, const MeasuredCollision& c) {
       const double ramp = experiment_.conditions[experiment_.trials[t].condition].ramp_length;
-      if (!c.position || *c.position <= ramp_room * ramp + most_step_share * chord) return;
+      if (!c.position || *c.position <= ramp_room * ramp + end_room * chord) return;
       beyond.add(lines_[t][i], *c.position);
       end = ramp;
     });
     if (beyond.count > 0)
       report(beyond,
              fmt::format("position_m: goes up to {:.4g} m, where the ramp ends at {:.4g} m{}", beyond.worst, end,
-                         suspected(length_units, beyond.worst, 0, ramp_room * end + most_step_share * chord)));
+                         !share.empty() && of_feet
+                             ? "; its steps are those of the feet: is ramp_length_m right?"
+                             : suspected(length_units, beyond.worst, 0, ramp_room * end + end_room * chord)));
   }
 
  private:
@@ -207,6 +229,14 @@ class Plausible {
   double most_kept() const {
     const auto [shortest, longest] = std::ranges::minmax(experiment_.wheel.leg_length);
     return gain_room * longest / shortest;
+  }
+  // Returns the steady speed on its slope of a wheel that keeps as much of omega^2 as no law or engine does.
+  double fastest_steady(std::size_t condition) const {
+    constexpr double kept = 0.75;
+    const dynamics::Wheel& wheel = experiment_.wheel;
+    const double slope = experiment_.conditions[condition].slope_deg * turn / 360;
+    return std::sqrt(4 * wheel.gravity * std::sin(wheel.leg_angle() / 2) * std::sin(slope) /
+                     (wheel.mean_leg_length() * (1 - kept)));
   }
   double typical_speed() const {
     std::vector<double> all;

@@ -126,7 +126,7 @@ class Mending {
         path, speed, speeds_.slowest / RollingSpeeds::room,
         speed * turn >= speeds_.slowest && speed * turn <= speeds_.lifting
             ? ": revolutions are suspected; multiply by 2 pi, or let 'metastable import' do it (angle=NAME[rev])"
-            : ": is time_s in seconds?"));
+            : ": is time_s in seconds, and the frame rate right?"));
   }
 
   void unwrap() {

@@ -13,6 +13,7 @@
 
 #include "analysis/statistics/median.h"
 #include "analysis/statistics/random.h"
+#include "analysis/wheel_model/leg_order.h"
 #include "analysis/wheel_model/standing_feet.h"
 #include "analysis/wheel_model/wheel_columns.h"
 #include "dynamics/numerics/truncated_normal.h"
@@ -484,6 +485,10 @@ WheelRuns wheel_runs(const Experiment& experiment) {
   measured.noise = experiment.sensor.noise_sd.value_or(0);
   tabulate_landings(measured);
   find_legs(measured, leg_column);
+  if (leg_column)
+    if (const auto question = question_on_leg_order(measured, experiment)) measured.notes.push_back(*question);
+  for (const std::string& note : experiment.notes)
+    if (note.ends_with('?')) measured.notes.push_back(note);
   if (!leg_column && !measured.legs_known) tabulate_landings(measured);  // of legs of the mean length
   judge_times(measured);
   complete_contexts(measured);

@@ -1,6 +1,7 @@
 #include "analysis/wheel_model/wheel_transitions.h"
 
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 
 #include <algorithm>
 #include <cmath>
@@ -106,6 +107,7 @@ class WheelTransitions : public TransitionModel {
   Evaluation evaluate_with(std::span<const double> nuisance, std::span<const EffectTerm> terms,
                            const Addition& added) const override;
   std::vector<FitStart> starts(std::span<const EffectTerm> terms) const override;
+  std::string size_in_words(std::span<const EffectTerm> terms) const override;
   std::vector<double> rest_chances(std::span<const double> nuisance, std::span<const EffectTerm> terms) const override;
   std::unique_ptr<TransitionModel> simulate(std::span<const double> nuisance, std::span<const EffectTerm> terms,
                                             std::uint64_t seed) const override;
@@ -324,6 +326,20 @@ std::vector<FitStart> WheelTransitions::starts(std::span<const EffectTerm> terms
         offer({restitution, wide, friction, wide});
   if (best.nuisance.empty()) return {};
   return {best};
+}
+
+// A drag is fitted with either sign, so that data with less loss than stated get a name, too.
+std::string WheelTransitions::size_in_words(std::span<const EffectTerm> terms) const {
+  std::vector<std::string> driving;
+  for (const EffectTerm& term : terms)
+    for (const char* drag : {"rolling_resistance", "axle_drag_viscous", "air_drag"})
+      if (term.candidate->id == drag && term.values.front() < 0) driving.push_back(drag);
+  if (driving.empty()) return {};
+  return fmt::format(
+      "A negative {} would drive the wheel, and no drag does: something acts alike. Are slope, inertia and the scale "
+      "of "
+      "the speeds as stated?",
+      fmt::join(driving, " and "));
 }
 
 std::vector<double> WheelTransitions::rest_chances(std::span<const double> nuisance,

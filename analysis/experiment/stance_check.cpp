@@ -1,0 +1,240 @@
+#include "analysis/experiment/stance_check.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <functional>
+#include <numbers>
+#include <optional>
+#include <utility>
+
+#include "analysis/statistics/median.h"
+
+namespace metastable::analysis {
+namespace {
+
+constexpr std::size_t least_stances_to_judge = 20;
+constexpr double radians = std::numbers::pi / 180;
+
+// A stance adds to omega^2 what gravity gives, whatever its collision left: in trials of four engines, of the virtual
+// laboratory and of wheels under the laws omega^2 behind a stance less that before it scatters by no more than the same
+// taken a row off. In columns that stand a row off it is the other way round, by a factor of 5.
+constexpr double row_off = 0.35;
+// Feet that hop hide energy in omega+: stances of engines gain up to 1.26 times what gravity gives. A slope is rarely
+// misread by more than 3 deg. Torques that resist take a tenth; a slope in per cent that is read in degrees, 0.43.
+constexpr double least_gain = 0.7, questioned_gain = 1.5, refused_gain = 1.8, misread_slope = 3 * radians;
+// Of the same trials, stances last 0.99 to 1.02 times what their speeds say. Feet that hop shorten that to 0.87, and
+// then omega^2 gains more than gravity gives.
+constexpr double time_room = 0.03, most_scatter = 0.1, too_long = 1.6;
+constexpr double slide_room = 1.1, two_steps = 1.8;  // of a distance between feet; sliding feet reach beyond both
+
+struct MeasuredStance {
+  std::size_t trial = 0, behind = 0;  // the collision that ends it, an index
+  double from = 0, to = 0;            // speeds [rad/s]
+};
+
+std::vector<MeasuredStance> measured_stances(const Experiment& experiment) {
+  std::vector<MeasuredStance> all;
+  for (std::size_t t = 0; t < experiment.trials.size(); ++t) {
+    const std::vector<MeasuredCollision>& rows = experiment.trials[t].collisions;
+    for (std::size_t k = 1; k < rows.size(); ++k)
+      if (rows[k - 1].omega_plus && *rows[k - 1].omega_plus > 0)
+        all.push_back({t, k, *rows[k - 1].omega_plus, rows[k].omega_minus});
+  }
+  return all;
+}
+
+double slope_of(const Experiment& experiment, std::size_t trial) {
+  return experiment.conditions[experiment.trials[trial].condition].slope_deg * radians;
+}
+
+// Returns by how much gravity raises omega^2 in a stance on this slope [rad], of a wheel whose mass is all in its hub.
+double most_gain(const Experiment& experiment, double slope) {
+  const dynamics::Wheel& wheel = experiment.wheel;
+  return 4 * wheel.gravity * std::sin(wheel.leg_angle() / 2) * std::sin(slope) / wheel.mean_leg_length();
+}
+
+// Returns the stated inertia about the foot over that of a wheel whose mass is all in its hub.
+double inertia_share(const Experiment& experiment) {
+  const dynamics::Wheel& wheel = experiment.wheel;
+  const double leg = wheel.mean_leg_length(), gyration = wheel.radius_of_gyration.value_or(0);
+  return wheel.inertia ? *wheel.inertia / (wheel.hub_mass * leg * leg) : 1 + gyration * gyration / (leg * leg);
+}
+
+double gained(const MeasuredStance& stance) { return stance.to * stance.to - stance.from * stance.from; }
+
+// Returns the median gain of stances over what `of_slope` says for theirs.
+double gain_share(const Experiment& experiment, const std::vector<MeasuredStance>& stances,
+                  const std::function<double(double)>& of_slope) {
+  std::vector<double> share;
+  for (const MeasuredStance& one : stances) share.push_back(gained(one) / of_slope(slope_of(experiment, one.trial)));
+  return median(std::move(share));
+}
+
+// Says by how many rows omega_plus seems to stand off: -1 where a row has that of the collision before.
+std::optional<int> rows_off(const Experiment& experiment) {
+  const auto scatter = [&](int off) {
+    std::vector<double> gains;
+    for (const MeasuredTrial& trial : experiment.trials) {
+      const auto& rows = trial.collisions;
+      for (std::size_t k = 0; k < rows.size(); ++k) {
+        const std::size_t end = k + static_cast<std::size_t>(1 + off);
+        if (end < rows.size() && rows[k].omega_plus && *rows[k].omega_plus > 0)
+          gains.push_back(rows[end].omega_minus * rows[end].omega_minus - *rows[k].omega_plus * *rows[k].omega_plus);
+      }
+    }
+    return gains.size() < least_stances_to_judge ? std::nullopt : std::optional(median_deviation(std::move(gains)));
+  };
+  const auto as_given = scatter(0);
+  for (const int off : {-1, 1})
+    if (const auto other = scatter(off); as_given && other && *other < row_off * *as_given) return off;
+  return std::nullopt;
+}
+
+// Says how long stances last by their speeds: omega^2 goes through both of them by the curve that gravity makes, either
+// scaled to the usual gain (another inertia), or with a torque that makes up for the difference.
+class Durations {
+ public:
+  Durations(const Experiment& experiment, const std::vector<MeasuredStance>& stances) : experiment_(experiment) {
+    std::vector<std::vector<double>> gains(experiment.conditions.size());
+    for (const MeasuredStance& one : stances) gains[experiment.trials[one.trial].condition].push_back(gained(one));
+    const double half = experiment.wheel.leg_angle() / 2;
+    for (std::size_t c = 0; c < gains.size(); ++c) {
+      const double slope = experiment.conditions[c].slope_deg * radians;
+      OnRamp on{gains[c].empty() ? 0 : median(std::move(gains[c])), most_gain(experiment, slope), {}};
+      for (int i = 0; i < pieces; ++i)
+        on.fallen[static_cast<std::size_t>(i)] =
+            (std::cos(half - slope) - std::cos(slope + half * (2 * middle_of(i) - 1))) /
+            (2 * std::sin(half) * std::sin(slope));
+      ramps_.push_back(on);
+    }
+  }
+  // Nothing where the wheel nearly stops, so that small errors decide.
+  std::optional<std::array<double, 2>> of(const MeasuredStance& stance) const {
+    constexpr double least_share = 0.2;  // of the omega^2 at the end
+    const OnRamp& on = ramps_[experiment_.trials[stance.trial].condition];
+    const double width = experiment_.wheel.leg_angle() / pieces,
+                 start = (stance.from * stance.from + stance.to * stance.to - on.usual) / 2;
+    std::array<double, 2> time{};
+    for (int i = 0; i < pieces; ++i) {
+      const double fallen = on.fallen[static_cast<std::size_t>(i)];
+      const std::array<double, 2> squared{start + on.usual * fallen,
+                                          start + on.given * fallen + (on.usual - on.given) * middle_of(i)};
+      for (std::size_t h = 0; h < 2; ++h) {
+        if (squared[h] < least_share * stance.to * stance.to) return std::nullopt;
+        time[h] += width / std::sqrt(squared[h]);
+      }
+    }
+    return time;
+  }
+
+ private:
+  static constexpr int pieces = 40;  // of a stance, even in the angle
+  static double middle_of(int piece) { return (piece + 0.5) / pieces; }
+  struct OnRamp {
+    double usual = 0, given = 0;             // gains of omega^2 [rad^2/s^2]
+    std::array<double, pieces> fallen = {};  // share of the gain that gravity has given in the middle of each piece
+  };
+  const Experiment& experiment_;
+  std::vector<OnRamp> ramps_;  // by condition
+};
+
+void ask_about_times(const Experiment& experiment, const std::vector<MeasuredStance>& stances, double gain,
+                     std::vector<std::string>& questions) {
+  const Durations durations(experiment, stances);
+  std::array<std::vector<double>, 2> share;  // measured over expected
+  std::size_t late = 0;
+  const MeasuredStance* first = nullptr;
+  double longest = 0;
+  for (const MeasuredStance& one : stances) {
+    const auto& rows = experiment.trials[one.trial].collisions;
+    if (!rows[one.behind].time || !rows[one.behind - 1].time) continue;
+    const auto expected = durations.of(one);
+    if (!expected) continue;
+    const double lasts = *rows[one.behind].time - *rows[one.behind - 1].time;
+    for (std::size_t h = 0; h < 2; ++h) share[h].push_back(lasts / (*expected)[h]);
+    if (std::min(share[0].back(), share[1].back()) < too_long) continue;
+    if (late++ == 0) first = &one;
+    longest = std::max(longest, lasts);
+  }
+  if (share[0].size() < least_stances_to_judge) return;
+  if (median_deviation_to_sd * median_deviation(share[0]) > most_scatter) return;
+  const auto [least, most] = std::minmax({median(share[0]), median(share[1])});
+  if (least > 1 + time_room || (most < 1 - time_room && gain < 1))
+    questions.push_back(
+        fmt::format("time_s and the speeds contradict each other: stances last {:.3g} times as long as the "
+                    "speeds at their ends say; are frame rate, clock, scale and offset of the speeds right?",
+                    least > 1 ? least : most));
+  else if (late > 0 && questions.empty())  // a step that is too long has asked already
+    questions.push_back(fmt::format(
+        "time_s: {} of {} stances last more than {} times as long as the speeds at their ends say, up to {:.3g} s, the "
+        "first of them before collision {} of trial {}: does the clock jump, or is a collision missing?",
+        late, share[0].size(), too_long, longest, experiment.trials[first->trial].collisions[first->behind].number,
+        experiment.trials[first->trial].number));
+}
+
+void ask_about_positions(const Experiment& experiment, std::vector<std::string>& questions) {
+  const double apart = 2 * experiment.wheel.mean_leg_length() * std::sin(experiment.wheel.leg_angle() / 2);
+  std::vector<double> steps;
+  std::vector<std::pair<int, int>> long_ones;  // trial, collision
+  for (const MeasuredTrial& trial : experiment.trials)
+    for (std::size_t k = 1; k < trial.collisions.size(); ++k) {
+      const MeasuredCollision &last = trial.collisions[k - 1], &next = trial.collisions[k];
+      if (!last.position || !next.position) continue;
+      steps.push_back((*next.position - *last.position) / apart);
+      if (steps.back() > two_steps) long_ones.emplace_back(trial.number, next.number);
+    }
+  if (long_ones.empty() || steps.size() < least_stances_to_judge) return;
+  const auto beyond = std::ranges::count_if(steps, [](double step) { return step > slide_room; });
+  if (static_cast<std::size_t>(beyond) > 2 * long_ones.size()) return;  // its feet slide
+  questions.push_back(
+      fmt::format("position_m: {} of {} steps are longer than {} times the {:.3g} m between its feet, the first of "
+                  "them before collision {} of trial {}: is a collision missing?",
+                  long_ones.size(), steps.size(), two_steps, apart, long_ones.front().second, long_ones.front().first));
+}
+
+}  // namespace
+
+void check_stances(const Experiment& experiment, const std::string& file, Defects& defects) {
+  const std::vector<MeasuredStance> stances = measured_stances(experiment);
+  if (stances.size() < least_stances_to_judge || !defects.empty()) return;
+  const double share = gain_share(experiment, stances, [&](double slope) {
+    return most_gain(experiment, std::min(slope + misread_slope, std::numbers::pi / 2));
+  });
+  if (share > refused_gain) {
+    const double given = gain_share(experiment, stances, [&](double slope) { return most_gain(experiment, slope); });
+    return defects.add(
+        file, {1, 1},
+        fmt::format("half of the stances raise omega^2 by {:.3g} times or more what gravity gives this wheel on the "
+                    "stated slope: speeds {:.2g} times too large are suspected, as by a misstated frame rate or unit",
+                    given, std::sqrt(given)));
+  }
+  if (const auto off = rows_off(experiment))
+    defects.add(
+        file, {1, 1},
+        fmt::format("omega_plus_rad_s: its values are suspected to stand one row {}: from omega_plus to the "
+                    "next omega_minus, gravity raises omega^2 by much the same in all stances, and does so from a "
+                    "row's omega_plus to {}",
+                    *off < 0 ? "late" : "early",
+                    *off < 0 ? "the same row's omega_minus" : "the omega_minus two rows on"));
+}
+
+std::vector<std::string> questions_on_stances(const Experiment& experiment) {
+  std::vector<std::string> questions;
+  ask_about_positions(experiment, questions);
+  const std::vector<MeasuredStance> stances = measured_stances(experiment);
+  if (stances.size() < least_stances_to_judge) return questions;
+  const double gain = gain_share(experiment, stances, [&](double slope) { return most_gain(experiment, slope); });
+  const double stated = gain * inertia_share(experiment);
+  if (gain > questioned_gain || stated < least_gain)
+    questions.push_back(fmt::format(
+        "half of the stances raise omega^2 by {:.3g} times or {} what gravity gives this wheel on the stated "
+        "slope: are slope, leg lengths, inertia and the scale of the speeds right?",
+        stated, stated < least_gain ? "less" : "more"));
+  ask_about_times(experiment, stances, gain, questions);
+  return questions;
+}
+
+}  // namespace metastable::analysis
