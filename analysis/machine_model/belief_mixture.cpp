@@ -122,13 +122,24 @@ double BeliefMixture<Most>::log_mass() const {
 }
 
 template <int Most>
-void BeliefMixture<Most>::add_wild(double share, double width) {
+void BeliefMixture<Most>::add_wild(double share, std::span<const double> widths) {
   if (!(share > 0) || parts_.empty()) return;
   Part one = collapsed();
-  one.log_weight = log_mass() + std::log(share);
-  one.width = width;
+  one.log_weight = log_mass() + std::log(share / static_cast<double>(widths.size()));
   for (Part& part : parts_) part.log_weight += std::log1p(-share);
-  parts_.push_back(std::move(one));
+  for (const double width : widths) {
+    one.width = width;
+    parts_.push_back(one);
+  }
+}
+
+template <int Most>
+void BeliefMixture<Most>::add(BeliefMixture other, double share) {
+  for (Part& part : parts_) part.log_weight += std::log1p(-share);
+  for (Part& part : other.parts_) {
+    part.log_weight += std::log(share);
+    parts_.push_back(std::move(part));
+  }
 }
 
 template <int Most>

@@ -61,9 +61,12 @@ class BeliefMixture {
   };
 
   std::vector<Part>& parts() { return parts_; }
-  /// Adds a part of this share with the mixture's own mean and covariance, around which values scatter `width` times as
-  /// far and which they do not update. The weights of the other parts are scaled down by the share.
-  void add_wild(double share, double width);
+  /// Adds a part for each width with the mixture's own mean and covariance, around which values scatter so many times
+  /// as far and which they do not update. These parts have the share together, alike; the weights of the others are
+  /// scaled down by it.
+  void add_wild(double share, std::span<const double> widths);
+  /// Adds the parts of another mixture, with this share of the whole.
+  void add(BeliefMixture other, double share);
   /// Makes bent parts straight about where a row's values leave them. Call it before they are seen.
   void straighten(std::span<const Look<Most>> looks, std::span<const double> values);
   /// Updates the mixture by a measured value (Bayes's rule); the weights then add up to 1.

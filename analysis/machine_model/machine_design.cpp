@@ -7,8 +7,10 @@
 #include <array>
 #include <cmath>
 #include <limits>
+#include <map>
 #include <numbers>
 #include <numeric>
+#include <set>
 #include <utility>
 
 #include "analysis/statistics/median.h"
@@ -23,6 +25,7 @@ constexpr std::size_t fewest_jumps = 3, jumps_to_moves = 10;
 // An error of half a column's spread is a quarter of its variance, and makes slopes from there as much too flat. A
 // column that goes far beyond its first values tells the slopes by its later ones.
 constexpr double most_error = 0.5;
+constexpr std::size_t most_codes = 8;    // An input of more values is a number even if all are whole.
 constexpr std::size_t fewest_first = 5;  // So many first values tell a spread.
 
 // Fills in means and spreads of the columns.
@@ -81,6 +84,37 @@ void measure_place(MachineDesign& design, const MachineRuns& runs) {
   design.placed = design.placed && design.last_position > design.first_position;
 }
 
+// Measures how inputs go along, and stores those of each step and of the steps before, in sds from their means.
+void measure_inputs(MachineDesign& design, const Machine& machine, const MachineRuns& runs) {
+  for (std::size_t i = 0; i < machine.inputs.size(); ++i) {
+    InputCourse& course = design.inputs.emplace_back();
+    std::set<double> values;
+    std::map<int, double> of_phase;
+    std::vector<double> all;
+    for (const StepPlace& at : design.steps) {
+      const std::vector<MachineRow>& rows = runs.trials[at.trial].rows;
+      const auto row = static_cast<std::size_t>(at.number) - 1;
+      const double here = all.emplace_back(rows[row].inputs[i]);
+      values.insert(here);
+      course.by_phase = course.by_phase && of_phase.try_emplace(at.phase, here).first->second == here;
+      course.changes = course.changes || here != rows.front().inputs[i];
+    }
+    course.code =
+        values.size() <= most_codes && std::ranges::all_of(values, [](double x) { return x == std::floor(x); });
+    const double count = std::max<double>(1, static_cast<double>(all.size()));
+    const double mean = std::accumulate(all.begin(), all.end(), 0.0) / count;
+    double squares = 0;
+    for (const double x : all) squares += (x - mean) * (x - mean);
+    const double sd = std::sqrt(squares / count);
+    for (StepPlace& at : design.steps)
+      for (std::size_t lag = 0; lag < input_lags; ++lag) {
+        const auto row = static_cast<std::size_t>(at.number) - 1;
+        const double then = runs.trials[at.trial].rows[row > lag ? row - lag : 0].inputs[i];
+        at.inputs.push_back(sd > 0 ? (then - mean) / sd : 0);
+      }
+  }
+}
+
 // Counts the jumps of a column by about a turn; 0 where it leaves the turn, or moves as widely otherwise.
 std::size_t jumps_by(const MachineRuns& runs, std::size_t sensor, double turn) {
   double least = std::numeric_limits<double>::infinity(), most = -least;
@@ -114,7 +148,7 @@ std::vector<std::string> wrapping_columns(const Machine& machine, const MachineR
         asked.push_back(fmt::format(
             "{0}: it jumps by about {1} from one row to the next {2} times and stays within {1}: is it an angle that "
             "wraps? Slopes across a jump are wrong: unwrap it along each trial (numpy.unwrap), and let the step go on "
-            "beyond {1}?",
+            "beyond {1}, or, in radians, name it under angles of metastable.machine?",
             machine.observe[j].state, name, jumps));
   return asked;
 }
@@ -161,6 +195,7 @@ MachineDesign machine_design(const Machine& machine, const MachineRuns& runs) {
             std::isnan(row.seen[j]) || !(design.sd[j] > 0) ? 0 : (row.seen[j] - design.mean[j]) / design.sd[j]);
       design.steps.push_back(std::move(place));
     }
+  measure_inputs(design, machine, runs);
   return design;
 }
 

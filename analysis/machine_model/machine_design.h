@@ -21,7 +21,18 @@ struct StepPlace {
   int phase = -1;            ///< index
   std::vector<int> labels;   ///< index of each label's value
   std::vector<double> seen;  ///< [sensors] before the step, in sds of its column from the mean; 0 where it is missing
+  /// [inputs x input_lags] of this step and of the steps before, likewise.
+  std::vector<double> inputs = {};
 };
+
+/// Says how an input goes along.
+struct InputCourse {
+  bool code = false;     ///< it takes few values, all whole: there is nothing between them
+  bool by_phase = true;  ///< it is the same wherever the phase is
+  bool changes = false;  ///< within a trial
+};
+
+inline constexpr std::size_t input_lags = 3;  ///< steps of which StepPlace::inputs holds the inputs: 0, 1 and 2 before
 
 /// The values that a sensor has in the first rows of trials.
 struct FirstValues {
@@ -41,6 +52,7 @@ struct MachineDesign {
   std::vector<double> mean, sd;                         ///< by sensor, of its column
   std::vector<double> change;                           ///< by sensor: sd of its change from row to row
   std::vector<FirstValues> first;                       ///< by sensor
+  std::vector<InputCourse> inputs;
 };
 
 MachineDesign machine_design(const Machine& machine, const MachineRuns& runs);

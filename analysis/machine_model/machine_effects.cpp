@@ -25,10 +25,11 @@ constexpr double waves_apart = 0.5;
 constexpr int stretches = 6;  // of the way
 constexpr long much_rarer =
     2;  // The second of two values is named where the first has more than so many times its steps.
-constexpr double largest_memory = 0.9;
+constexpr double largest_memory = 0.9, all_noises = -1;
 // Zeros of sensors are known to a share of what a column spans, or to some of its errors.
 constexpr double usual_bias = 0.1, bias_errors = 3;
 constexpr double largest_share = 0.2;  // of outliers
+constexpr double longest_lag = 3;      // of an input [steps]
 constexpr double widest_launch = 10;   // launches are off by so many of their stated sds at most, at least
 constexpr double launch_errors = 4;    // standard errors from which on first rows suggest a size by themselves
 
@@ -242,12 +243,14 @@ class Varying {
   double range_;
 };
 
+// One noise remembers, or all of them do alike, as where they come from the same ground: noise number 0.
 MachineCandidate memory(const Machine& machine) {
   MachineCandidate one;
   one.candidate.id = "memory";
   one.candidate.parameters = {{0, -largest_memory, largest_memory, 1e-3}};
   one.candidate.variants.clear();
   for (int m = 0; m < machine.scores; ++m) one.candidate.variants.push_back({static_cast<double>(m)});
+  if (machine.scores > 1) one.candidate.variants.push_back({all_noises});
   one.candidate.report = [](const Values& variant, const Values& v) {
     return std::vector<NamedValue>{{"correlation", v[0]}, {"noise_number", variant[0] + 1}};
   };
@@ -255,7 +258,25 @@ MachineCandidate memory(const Machine& machine) {
   one.apply = [scores = static_cast<std::size_t>(machine.scores)](MachineHypothesis& h, const Values& variant,
                                                                   const Values& v) {
     h.memory.resize(scores);
-    h.memory[static_cast<std::size_t>(variant[0])] = v[0];
+    if (variant[0] == all_noises)
+      std::ranges::fill(h.memory, v[0]);
+    else
+      h.memory[static_cast<std::size_t>(variant[0])] = v[0];
+  };
+  return one;
+}
+
+// A recorded input acts later, as through an actuator that lags.
+MachineCandidate lag(const Machine& machine, const MachineDesign& design, std::size_t input) {
+  MachineCandidate one;
+  one.candidate.id = "lag_" + machine.inputs[input];
+  one.candidate.parameters = {{0, 0, longest_lag, fine_step * longest_lag}};
+  one.candidate.seek_far = true;
+  one.candidate.report = reporting({}, {"steps"});
+  if (!design.inputs[input].changes) one.candidate.undecidable = machine.inputs[input] + " changes within no trial";
+  one.apply = [input, inputs = machine.inputs.size()](MachineHypothesis& h, const Values&, const Values& v) {
+    h.lag.resize(inputs);
+    h.lag[input] = v[0];
   };
   return one;
 }
@@ -396,6 +417,8 @@ std::vector<MachineCandidate> machine_effects(const Machine& machine, std::share
     for (MachineCandidate& one : Varying(machine.parameters[p], p, design).all(machine)) all.push_back(std::move(one));
   }
   all.push_back(memory(machine));
+  for (std::size_t i = 0; i < machine.inputs.size(); ++i)
+    if (!design->inputs[i].code) all.push_back(lag(machine, *design, i));
   all.push_back(outliers());
   for (std::size_t j = 0; j < machine.observe.size(); ++j) all.push_back(sensor_noise(machine, *design, j));
   for (std::size_t j = 0; j < machine.observe.size(); ++j) all.push_back(sensor_bias(machine, *design, j));

@@ -2,9 +2,12 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
+#include <map>
 #include <utility>
 
 #include "analysis/machine_model/belief_step.h"
+#include "analysis/statistics/median.h"
 #include "dynamics/numerics/truncated_normal.h"
 
 namespace metastable::analysis {
@@ -23,6 +26,25 @@ int bent_numbers(const Machine& machine, const ScorePlan& plan) {
   return machine.observe.size() > 1 ? static_cast<int>(plan.lattice.size()) : 0;
 }
 
+// Says how the values of first rows scatter, whatever a few of them are.
+NormalLaunch usual_first_row(const MachineRuns& runs, std::size_t sensor) {
+  std::vector<double> values;
+  for (const MachineTrial& trial : runs.trials)
+    if (!trial.rows.empty() && !std::isnan(trial.rows.front().seen[sensor]))
+      values.push_back(trial.rows.front().seen[sensor]);
+  if (values.empty()) return {0, column_spread(runs, sensor).sd};
+  const double middle = median(values);
+  return {middle, median_deviation_to_sd * median_deviation(std::move(values))};
+}
+
+// Joins what comes of a step from another beginning, which has this share.
+template <int Most>
+void take_beside(AfterStep<Most>& after, AfterStep<Most> other, double share) {
+  after.belief.add(std::move(other.belief), share);
+  after.failed += share * (other.failed - after.failed);
+  after.failed_wide += share * (other.failed_wide - after.failed_wide);
+}
+
 // Follows all trials of the runs under one hypothesis.
 template <int Most>
 class Follower {
@@ -36,6 +58,7 @@ class Follower {
       shared_.push_back(machine.observe[j].correlation != 0 ? shared_count_++ : -1);
       scale_.push_back(column_spread(runs, j).sd);
       stated_.push_back(machine.stated_launch(machine.observe[j].state));
+      first_rows_.push_back(usual_first_row(runs, j));
     }
     bent_ = bent_numbers(machine, plan);
     std::size_t number = 0;
@@ -55,6 +78,8 @@ class Follower {
   // A row that says nothing may be a failure, too.
   double tolerated(double chance) const { return supposed_.wild + (1 - supposed_.wild) * chance; }
   Part launched(const MachineRow& row) const;
+  Part begun_elsewhere(const MachineRow& row) const;
+  std::map<std::size_t, AfterStep<Most>> stepped_elsewhere(BeliefStep<Most>& stepping) const;
   Part begun(const MachineRow& row);
   Look<Most> look(std::size_t sensor, Eigen::Index size) const;
   Part see(AfterStep<Most>& after, const MachineRow& row);
@@ -71,6 +96,7 @@ class Follower {
   int bent_ = 0;                              // numbers of the vector in which beliefs are bent
   std::vector<double> scale_;                 // by sensor: spread of its column
   std::vector<const MachineLaunch*> stated_;  // by sensor: the launch that is stated of its state; nullptr: none
+  std::vector<NormalLaunch> first_rows_;      // by sensor: how values of first rows scatter
   std::vector<std::size_t> first_;            // by trial: number of its first transition
   Evaluation out_;
   std::vector<double>* chances_ = nullptr;
@@ -148,12 +174,48 @@ typename BeliefMixture<Most>::Part Follower<Most>::begun(const MachineRow& row) 
   }
   BeliefMixture<Most> mixture;
   mixture.parts().push_back(std::move(belief));
-  mixture.add_wild(supposed_.wild, wild_width);
+  mixture.add_wild(supposed_.wild, wild_widths);
   for (const std::size_t j : compared) put(cursor_[trial_]++, mixture.see(look(j, size), row.seen[j], 0), 0);
   belief = mixture.collapsed();
   belief.mean.conservativeResize(kept);
   belief.covariance.conservativeResize(kept, kept);
   return belief;
+}
+
+// The belief at a trial's first row where that row is wild: the trial begins as others do.
+template <int Most>
+typename BeliefMixture<Most>::Part Follower<Most>::begun_elsewhere(const MachineRow& row) const {
+  MachineRow nothing = row;
+  std::ranges::fill(nothing.seen, std::numeric_limits<double>::quiet_NaN());
+  Part belief = launched(nothing);
+  for (std::size_t j = 0; j < state_.size(); ++j) {
+    if (stated_[j]) continue;
+    belief.mean[state_[j]] = first_rows_[j].mean - (supposed_.bias.empty() ? 0 : supposed_.bias[j]);
+    belief.covariance(state_[j], state_[j]) = first_rows_[j].sd * first_rows_[j].sd + added_variance(j);
+  }
+  return belief;
+}
+
+// Steps trials from first rows that are wild, by trial. A wild first row is no event, but a trial that was believed to
+// begin where it shows would look like one with a wide noise.
+template <int Most>
+std::map<std::size_t, AfterStep<Most>> Follower<Most>::stepped_elsewhere(BeliefStep<Most>& stepping) const {
+  std::vector<TransitionPlace> places;
+  std::vector<Part> beliefs;
+  for (std::size_t t = 0; t < runs_.trials.size() && supposed_.wild > 0; ++t) {
+    const std::vector<MachineRow>& rows = runs_.trials[t].rows;
+    if (rows.size() < 2) continue;
+    bool shows = false;
+    for (std::size_t j = 0; j < state_.size(); ++j) shows |= !stated_[j] && !std::isnan(rows.front().seen[j]);
+    if (!shows) continue;
+    places.push_back({t, 0, first_[t]});
+    beliefs.push_back(begun_elsewhere(rows.front()));
+  }
+  std::map<std::size_t, AfterStep<Most>> by_trial;
+  if (!places.empty())
+    stepping.step(places, beliefs,
+                  [&](std::size_t i, AfterStep<Most>& after) { by_trial[places[i].trial] = std::move(after); });
+  return by_trial;
 }
 
 template <int Most>
@@ -192,7 +254,7 @@ typename BeliefMixture<Most>::Part Follower<Most>::see(AfterStep<Most>& after, c
   if (unseen(row)) {
     if (plan_.failing) put(event++, {std::log(std::max(least_chance, 1 - failed)), 0, 1}, failed);
   } else {
-    after.belief.add_wild(supposed_.wild, wild_width);
+    after.belief.add_wild(supposed_.wild, wild_widths);
     std::vector<Look<Most>> looks;
     std::vector<double> values;
     for (std::size_t j = 0; j < state_.size(); ++j) {
@@ -233,8 +295,12 @@ Evaluation Follower<Most>::follow(const std::vector<Event>& events, std::vector<
         before.push_back(beliefs[t]);
       }
     if (places.empty()) break;
+    std::map<std::size_t, AfterStep<Most>> elsewhere;
+    if (k == 0) elsewhere = stepped_elsewhere(stepping);
     stepping.step(places, before, [&](std::size_t i, AfterStep<Most>& after) {
       trial_ = places[i].trial;
+      if (const auto other = elsewhere.find(trial_); other != elsewhere.end())
+        take_beside(after, std::move(other->second), supposed_.wild);
       const MachineTrial& trial = runs_.trials[trial_];
       if (k + 1 < trial.rows.size()) {
         beliefs[trial_] = see(after, trial.rows[k + 1]);

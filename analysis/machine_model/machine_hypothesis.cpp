@@ -10,7 +10,7 @@ namespace {
 bool only_adds(const MachineHypothesis& h, const MachineHypothesis& plain) {
   return h.values == plain.values && h.sensor_sd == plain.sensor_sd && h.wild == plain.wild && h.laws.empty() &&
          h.spreads.empty() && h.memory.empty() && h.added_noise.empty() && h.bias.empty() && h.launch_offset.empty() &&
-         h.launch_scatter.empty() && h.outliers == 0;
+         h.launch_scatter.empty() && h.lag.empty() && h.outliers == 0;
 }
 
 std::vector<double> per(double step, std::vector<double> transition) {

@@ -1,6 +1,7 @@
 #pragma once
 // A hypothesis about a machine, under which its trials are followed: the values of its map, and how they vary.
 
+#include <array>
 #include <cstddef>
 #include <functional>
 #include <optional>
@@ -47,6 +48,7 @@ struct MachineHypothesis {
   std::vector<double> bias = {};            ///< by sensor: what is seen is so much more than the state
   std::vector<double> launch_offset = {};   ///< by state: launches are at so much more than is stated; empty: 0
   std::vector<double> launch_scatter = {};  ///< by state: sd by which they scatter beside what is stated; empty: 0
+  std::vector<double> lag = {};             ///< by input [steps]: what acts is what was recorded so long before
   double outliers = 0;                      ///< share of steps whose scores are drawn wide
   double wild = 0;                          ///< share of rows that say nothing of the state
 };
@@ -73,6 +75,8 @@ using MachineChange =
     std::function<void(MachineHypothesis&, const std::vector<double>& variant, const std::vector<double>& values)>;
 
 inline constexpr double outlier_width = 4;  ///< sd of the scores of an outlier
-inline constexpr double wild_width = 10;    ///< sd of a wild row, in sds of what was expected there
+/// Half of the wild rows have the one, half the other sd, in sds of what was expected there: glitches of a sensor may
+/// be of any size.
+inline constexpr std::array<double, 2> wild_widths{10, 100};
 
 }  // namespace metastable::analysis

@@ -188,7 +188,7 @@ std::vector<std::string> stuck_trials(const MachineRuns& runs, const TrialColumn
     if (stands_still(column.values[t])) stuck.push_back(t);
   }
   if (stuck.empty() || 2 * stuck.size() > told) return {};
-  return {fmt::format("{}: it is {} in every row of trial {}{}: did its sensor stand still?", column.name,
+  return {fmt::format("{}: it is {:.6g} in every row of trial {}{}: did its sensor stand still?", column.name,
                       column.values[stuck.front()].front(), runs.name_of(stuck.front()),
                       stuck.size() > 1 ? fmt::format(", and constant in {} others", stuck.size() - 1) : "")};
 }

@@ -44,8 +44,13 @@ enum Purpose : std::size_t {
   wild_error = 160,
   launch = 192,
   donor = 224,
-  kernel = 225
+  kernel = 225,
+  wild_size = 226
 };
+
+double wild_width(const Draws& draws, std::size_t row) {
+  return wild_widths[draws.uniform(row, wild_size) < 0.5 ? 0 : 1];
+}
 
 // A trial under way.
 struct Walking {
@@ -143,7 +148,8 @@ Walking Walker::launched(std::size_t trial, MachineRow& first) const {
     double& point = walking.point[static_cast<Eigen::Index>(s)];
     if (drawn_launch(j, row)) {
       const NormalLaunch from = supposed_launch(supposed_, *machine_.stated_launch(machine_.observe[j].state), s);
-      if (is_wild) off = wild_width * std::hypot(from.sd, supposed_.sensor_sd[j]) * draws.normal(0, wild_error + j);
+      if (is_wild)
+        off = wild_width(draws, 0) * std::hypot(from.sd, supposed_.sensor_sd[j]) * draws.normal(0, wild_error + j);
       if (!supposed_.bias.empty()) off += supposed_.bias[j];
       first.seen[j] = point + off;
       continue;
@@ -174,7 +180,8 @@ MachineRow Walker::seen(std::size_t trial, std::size_t row, Walking& walking) co
     double off = error(j, walking.errors[at], before);
     if (!supposed_.added_noise.empty()) off += supposed_.added_noise[j] * draws.normal(row, added + j);
     if (is_wild)
-      off = wild_width * std::hypot(design.change[j], supposed_.sensor_sd[j]) * draws.normal(row, wild_error + j);
+      off = wild_width(draws, row) * std::hypot(design.change[j], supposed_.sensor_sd[j]) *
+            draws.normal(row, wild_error + j);
     if (!supposed_.bias.empty()) off += supposed_.bias[j];
     out.seen[j] = walking.point[static_cast<Eigen::Index>(machine_.state_index(machine_.observe[j].state))] + off;
   }

@@ -10,6 +10,15 @@ namespace {
 
 constexpr std::uint8_t lost_mark = 2;  // it did not fail, and there is no next state
 
+// Returns an input as it was recorded `lag` steps before a row; between two rows it goes in a straight line. Before the
+// trial it is taken to be what the first row has.
+double lagged_input(const MachineTrial& trial, std::size_t row, std::size_t input, double lag) {
+  const auto before = [&](std::size_t steps) { return trial.rows[row > steps ? row - steps : 0].inputs[input]; };
+  const auto whole = static_cast<std::size_t>(lag);
+  const double rest = lag - static_cast<double>(whole);
+  return rest > 0 ? (1 - rest) * before(whole) + rest * before(whole + 1) : before(whole);
+}
+
 }  // namespace
 
 MachineStepper::MachineStepper(const Machine& machine, const MachineRuns& runs, const MachineHypothesis& supposed)
@@ -95,8 +104,9 @@ void MachineStepper::add_straight(const TransitionPlace& place, const Eigen::Ref
   }
   for (std::size_t v = 0; v < lower_.size(); ++v)
     if (varies_[v]) values_[v].push_back(value_at(v, place, point));
-  const MachineRow& row = runs_.trials[place.trial].rows[place.row];
-  for (std::size_t i = 0; i < row.inputs.size(); ++i) values_[lower_.size() + i].push_back(row.inputs[i]);
+  for (std::size_t i = 0; i < machine_.inputs.size(); ++i)
+    values_[lower_.size() + i].push_back(
+        lagged_input(runs_.trials[place.trial], place.row, i, supposed_.lag.empty() ? 0 : supposed_.lag[i]));
 }
 
 // Stores what the map returned for a point, with the pushes added.

@@ -49,6 +49,7 @@ constexpr double misstated_share = 0.01;
 // chance reaches in 0.3 %. The effects that promise most, so many, may speak for the stated value.
 constexpr double strained_sds = 2, misstated_sds = 3;
 constexpr std::size_t most_instead = 3;
+constexpr double chance_sds = 2;  // So far from its mean chance takes what n numbers gain: n, with a variance of 2 n.
 
 // Steps that are drawn for the expected steps, and failures that end them: 6 % of error. Below a few failures they say
 // next to nothing.
@@ -234,6 +235,7 @@ class MachineTransitions : public TransitionModel {
   void set_aside_what_is_misstated(const Fit& recalibrated);
   std::vector<double> levels_of_own_draws(const std::vector<double>& nuisance) const;
   std::vector<std::string> effects_instead(const Fit& recalibrated) const;
+  bool only_wild_rows(const Fit& recalibrated) const;
 
  private:
   std::unique_ptr<MachineTransitions> drawn(const MachineRuns& like, std::span<const double> nuisance,
@@ -538,8 +540,23 @@ std::vector<std::string> MachineTransitions::effects_instead(const Fit& recalibr
   return all;
 }
 
+// Says whether a recalibration gains by the share of wild rows alone, but for what chance gains in the others.
+bool MachineTransitions::only_wild_rows(const Fit& recalibrated) const {
+  if (!(machine_->most_wild > 0)) return false;
+  std::vector<double> values = nominal_values(*this);
+  values.back() = recalibrated.nuisance.back();
+  const double gain =
+      2 * (recalibrated.penalised - evaluate(values, {}).total() + nuisances_.back().cost(values.back()));
+  const auto others = static_cast<double>(values.size() - 1);
+  return gain < others + chance_sds * std::sqrt(2 * others);
+}
+
 std::vector<std::string> MachineTransitions::misstated(const Fit& recalibrated) const {
   const std::vector<std::size_t> slots = misstated_slots(*this, recalibrated.nuisance);
+  if (slots.empty() && only_wild_rows(recalibrated))
+    return {fmt::format(
+        "Nothing but the share of wild rows, {:.2g}, differs from the model as given: what is stated holds.",
+        share_of(recalibrated.nuisance.back()))};
   if (slots.empty()) return {};
   const Eigen::MatrixXd root = resolved_root(recalibrated.information);
   std::vector<std::string> far;

@@ -44,6 +44,10 @@ std::vector<Facet> facets(const Machine& machine, const MachineDesign& design) {
                      const double x = std::clamp(at.seen[j], -4.0, 4.0);
                      return i == 0 ? x : (x * x - 1) / std::numbers::sqrt2;
                    }});
+  for (std::size_t i = 0; i < machine.inputs.size(); ++i)
+    if (!design.inputs[i].by_phase)
+      all.push_back({machine.inputs[i], design.inputs[i].changes ? input_lags : 1,
+                     [i](const StepPlace& at, std::size_t lag) { return at.inputs[input_lags * i + lag]; }});
   if (design.phases.size() > 1)
     all.push_back({"phase", design.phases.size() - 1,
                    [](const StepPlace& at, std::size_t i) { return at.phase == static_cast<int>(i) ? 1.0 : 0.0; },

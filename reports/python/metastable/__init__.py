@@ -609,7 +609,7 @@ def diagnose(experiment, machine=None, *, catalogue=(), at_slope=None, at_speed=
     if isinstance(experiment, Runs) or machine is not None:
         if not isinstance(experiment, Runs) or not isinstance(machine, Machine):
             raise TypeError("diagnose: runs of a machine are given with it: diagnose(runs, machine)")
-        if experiment._columns != (tuple(machine.sensor), machine.inputs):
+        if experiment._columns != (tuple(machine.sensor), machine.inputs, machine.angles):
             raise InputError("diagnose: the runs were made for a machine with other columns")
         if at_slope is not None or at_speed is not None:
             raise InputError("at_slope, at_speed: have no meaning with a machine of your own")

@@ -335,6 +335,7 @@ class Machine:
     sensor: Dict[str, Tuple[Optional[float], float]]
     launch: Dict[str, Tuple[float, ...]]
     inputs: Tuple[str, ...]
+    angles: Tuple[str, ...]
     most_wild: float
     name: str
     def walker(self, start: Optional[ArrayLike] = None, **values: float) -> Walker: ...
@@ -536,6 +537,7 @@ def machine(step: Callable[..., Tuple[ArrayLike, ArrayLike]], *, states: Sequenc
             parameters: Mapping[str, Sequence[float]], effects: Mapping[str, Mapping[str, Sequence[float]]] = {},
             may_vary: Sequence[str] = (), sensor: Optional[Mapping[str, Any]] = None,
             launch: Mapping[str, Sequence[float]] = {}, inputs: Sequence[str] = (), most_wild: float = 0.01,
+            angles: Union[str, Sequence[str]] = (),
             name: str = "machine") -> Machine: ...
 
 

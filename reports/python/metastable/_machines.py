@@ -43,14 +43,58 @@ def _sensor(state, value):
     return sd, _row_of_numbers(correlation, 1, 1, f"sensor: {state}: correlation")[0]
 
 
+def _within_half_a_turn(angle):
+    return angle - 2 * math.pi * numpy.round(angle / (2 * math.pi))
+
+
+def _turning(step, at):
+    """A step whose angles, the states `at`, go on beyond a turn: `step` gets them within pi of zero, and of the angles
+    that are alike those come next that lie within pi of the ones before."""
+    def turning(state, noise, p):
+        turned = numpy.array(state)
+        turned[:, at] = _within_half_a_turn(turned[:, at])
+        turned.setflags(write=False)
+        returned = step(turned, noise, p)
+        if not isinstance(returned, tuple) or len(returned) != 2 or numpy.shape(returned[0]) != numpy.shape(state):
+            return returned  # It is refused with the sentence that any step gets.
+        following = numpy.array(returned[0], float)
+        following[:, at] = state[:, at] + _within_half_a_turn(following[:, at] - state[:, at])
+        return following, returned[1]
+    return turning
+
+
+def _unwrapped(values, state, index, names, about):
+    """An angle that goes on beyond a turn along each trial, from within pi of `about`, if this is known."""
+    values = values.copy()
+    for trial in range(len(names)):
+        begin, end = numpy.searchsorted(index, [trial, trial + 1])
+        known = numpy.flatnonzero(numpy.isfinite(values[begin:end]))
+        gaps = numpy.flatnonzero(numpy.diff(known) > 1)
+        if len(gaps):
+            raise InputError(f"angles: {state} is missing in trial {names[trial]}, row {known[gaps[0]] + 2}, and comes "
+                             "back: how many turns it made there is not known. End the trial there, or give the angle "
+                             "unwrapped and not under angles")
+        if not len(known):
+            continue
+        one = values[begin + known]
+        one[0] = one[0] if about is None else about + _within_half_a_turn(one[0] - about)
+        values[begin + known] = one[0] + numpy.concatenate([[0], numpy.cumsum(_within_half_a_turn(numpy.diff(one)))])
+    return values
+
+
 class Machine:
     """A simulator with its names; see machine()."""
 
-    def __init__(self, step, *, states, noise, parameters, effects, may_vary, sensor, launch, inputs, most_wild, name):
+    def __init__(self, step, *, states, noise, parameters, effects, may_vary, sensor, launch, inputs, most_wild, angles, name):
         if not callable(step):
             raise TypeError(f"step: a function expected, not {type(step).__name__}")
-        self.step, self.noise, self.name = step, noise, name
-        self.states = _words(states, "states")
+        self.noise, self.name = noise, name
+        self.states, self.angles = _words(states, "states"), _words(angles, "angles")
+        for angle in self.angles:
+            if angle not in self.states:
+                raise InputError(f"angles: \"{angle}\" is none of the states {', '.join(self.states)}")
+        self._given_step = step
+        self.step = _turning(step, [self.states.index(angle) for angle in self.angles]) if self.angles else step
         self.parameters = {key: _parameter(key, value) for key, value in dict(parameters).items()}
         self.effects = {key: {one: _row_of_numbers(value, 3, 3, f"effects: {key}: {one}") for one, value in dict(inner).items()}
                         for key, inner in dict(effects).items()}
@@ -94,11 +138,11 @@ class Machine:
             if not math.isfinite(nominal[name]) or not lower <= nominal[name] <= upper:
                 raise InputError(f"walker: {what}: {nominal[name]:g} is outside its bounds [{lower:g}, {upper:g}]")
         return metastable.walker(lambda state, noise: self._step_with(nominal, state, noise), len(self.states), self.noise,
-                                 start=start, names=self.states, name=self.name)
+                                 start=start, names=self.states, name=self.name, angles=self.angles)
 
     def _step_with(self, values, state, noise):
         given = dict(values)
-        returned = self.step(state, noise, given)
+        returned = self._given_step(state, noise, given)
         if len(given) != len(values) or any(given.get(name) is not value for name, value in values.items()):
             raise InputError("step: it writes into p, which it may only read")
         return returned
@@ -345,13 +389,17 @@ class Runs:
         step = None if other else find("step")  # a column of this name that means something else numbers no rows
         lost = _LostRows(numpy.arange(rows) if step is None else step, index, names)
         self.lost = int(lost.lost.sum())
-        self._columns = tuple(machine.sensor), machine.inputs
+        self._columns = tuple(machine.sensor), machine.inputs, machine.angles
+        seen, all_index = lost.nothing(seen), index[lost.source]
+        for column, state in enumerate(machine.sensor):
+            if state in machine.angles:
+                seen[:, column] = _unwrapped(seen[:, column], state, all_index, names, machine.launch.get(state, (None,))[0])
 
         def stacked(all_columns, kind):
             return numpy.column_stack(all_columns) if all_columns else numpy.zeros((len(lost.source), 0), kind)
 
         self._laid_out = dict(
-            trial=index[lost.source], trial_names=names, seen=lost.nothing(seen), time=lost.evenly(time),
+            trial=all_index, trial_names=names, seen=seen, time=lost.evenly(time),
             position=lost.evenly(position), phase=lost.going_on(phase, "phase", len(phases) < 2), phases=phases,
             conditions=conditions, trial_condition=condition[first], labels=label_values,
             label_index=stacked([lost.going_on(one, name, True) for one, name in zip(label_index, label_values)], int),
@@ -491,7 +539,7 @@ def _outcomes_by_trial(items, trials, conditions, condition_names):
 
 
 def machine(step, *, states, noise, parameters, effects={}, may_vary=(), sensor=None, launch={}, inputs=(), most_wild=0.01,
-            name="machine"):
+            angles=(), name="machine"):
     """Any simulator as a machine whose sim-to-real gap is diagnosed: diagnose(runs, machine) then takes it.
 
     step        step(state, noise, p) -> (next, failed), vectorised: `state` is an (n, states) array, `noise` an (n, noise)
@@ -513,9 +561,11 @@ def machine(step, *, states, noise, parameters, effects={}, may_vary=(), sensor=
                 launch_STATE and launch_spread_STATE), and one that lacks it begins there
     inputs      names of recorded numbers that a step takes, by the row it starts from
     most_wild   largest share of rows that may say nothing (missed events, bad tracks), 0 to 0.2
+    angles      states that are angles [rad] and may wrap: `step` gets them within pi of zero and may return them in any
+                turn, and runs may hold them in any turn; they are taken to move by less than pi in a step
     """
     return Machine(step, states=states, noise=noise, parameters=parameters, effects=effects, may_vary=may_vary,
-                   sensor=sensor, launch=launch, inputs=inputs, most_wild=most_wild, name=name)
+                   sensor=sensor, launch=launch, inputs=inputs, most_wild=most_wild, angles=angles, name=name)
 
 
 def runs(machine, data=None, *, outcome=None, labels=(), inputs=None, **columns):
