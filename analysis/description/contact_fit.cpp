@@ -392,9 +392,9 @@ std::vector<std::string> ambiguities(const ContactFit& fit) {
   if (std::isinf(weakest.sd))
     sentences.push_back(fmt::format("These data say nothing about {}.", combination(weakest)));
   else
-    sentences.push_back(fmt::format("Best known is {} (standard error {:.2g}), least known {} ({:.2g}).",
-                                    combination(fit.directions.front()), fit.directions.front().sd,
-                                    combination(weakest), weakest.sd));
+    sentences.push_back(
+        fmt::format("These data fix best the sum {} (standard error {:.2g}), and worst the sum {} ({:.2g}).",
+                    combination(fit.directions.front()), fit.directions.front().sd, combination(weakest), weakest.sd));
   if (fit.status != ContactFit::Status::converged) return sentences;
   for (std::size_t i = 0; i < 4; ++i)
     for (std::size_t j = 0; j < i; ++j)

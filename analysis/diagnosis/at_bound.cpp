@@ -1,6 +1,7 @@
 #include "analysis/diagnosis/at_bound.h"
 
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 
 #include <algorithm>
 #include <cmath>
@@ -83,9 +84,14 @@ std::vector<AtBound> values_at_bound(const TransitionModel& model, const Fit& fi
   return all;
 }
 
-std::string at_bound_in_words(const AtBound& one) {
-  const std::string which =
+std::string at_bound_in_words(const AtBound& one, const std::vector<EffectTerm>& beside) {
+  std::string which =
       one.of.empty() ? "The fitted " + one.parameter : fmt::format("The {} of {}", one.parameter, one.of);
+  if (one.of.empty() && !beside.empty()) {
+    std::vector<std::string> effects;
+    for (const EffectTerm& term : beside) effects.push_back(term.candidate->id);
+    which += fmt::format(", beside {},", fmt::join(effects, " and "));
+  }
   if (one.of.empty() && one.upper && one.parameter == most_wild_reported)
     return fmt::format(
         "{} stands at the largest that most_wild allows, {:.4g}: more rows may be wild (spikes, missed events), and "

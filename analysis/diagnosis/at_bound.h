@@ -14,7 +14,8 @@ namespace metastable::analysis {
 /// listed.
 std::vector<AtBound> values_at_bound(const TransitionModel& model, const Fit& fit);
 
-/// Says it in a sentence.
-std::string at_bound_in_words(const AtBound& one);
+/// Says it in a sentence. @param beside  effects of the hypothesis, by which its nuisances may differ from those of the
+/// recalibrated model
+std::string at_bound_in_words(const AtBound& one, const std::vector<EffectTerm>& beside = {});
 
 }  // namespace metastable::analysis

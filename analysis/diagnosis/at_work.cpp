@@ -72,6 +72,14 @@ bool of_one_group(const std::vector<EffectGroup>& groups, const std::string& eff
   });
 }
 
+// Says whether a hypothesis has another effect in the place of one of several, beside the same others, and fits the
+// data as well.
+bool stands_in(const Cause& cause, const std::string& effect, const Cause& first, const Rules& rules) {
+  return first.effects.size() > 1 && cause.effects.size() == first.effects.size() && !holds(cause, effect) &&
+         first.gain - cause.gain < rules.told_apart &&
+         std::ranges::all_of(first.effects, [&](const std::string& one) { return one == effect || holds(cause, one); });
+}
+
 // Returns the probability that one of these effects is at work.
 double probability_of(const std::vector<std::string>& effects, const Probabilities& probabilities,
                       const Odds& unnamed) {
@@ -93,6 +101,7 @@ std::vector<AtWork> list_at_work(const Probabilities& probabilities, const Odds&
   const auto probability = [&](const std::vector<std::string>& effects) {
     return probability_of(effects, probabilities, unnamed);
   };
+  const bool whole = unnamed.none() < rules.most_odds_of_none();
   // Effects of the first hypothesis, each with what stands in its place in those that are alike to it.
   std::vector<std::string> listed;
   for (const std::string& effect : ranked.front().effects) {
@@ -100,10 +109,11 @@ std::vector<AtWork> list_at_work(const Probabilities& probabilities, const Odds&
     if (one.probability < rules.least_at_work) {
       for (const Cause& cause : ranked) {
         if (holds(cause, effect)) continue;
-        const bool acts_alike = std::ranges::find(alike, cause.name()) != alike.end();
+        const bool acts_alike = std::ranges::find(alike, cause.name()) != alike.end(),
+                   in_its_place = whole && stands_in(cause, effect, ranked.front(), rules);
         if (!acts_alike && probability(one.effects) >= rules.least_at_work) continue;
         for (const std::string& other : cause.effects)
-          if (!holds(ranked.front(), other) && (acts_alike || of_one_group(groups, effect, other)) &&
+          if (!holds(ranked.front(), other) && (acts_alike || in_its_place || of_one_group(groups, effect, other)) &&
               std::ranges::find(one.effects, other) == one.effects.end())
             one.effects.push_back(other);
       }
@@ -207,6 +217,36 @@ void add_closed_shares(std::vector<AtWork>& at_work, const TransitionModel& mode
     one.whose->closes_beside = closed[one.beside].estimate();
     one.whose->closes_mean = mean_of(closed[one.alone], closed[one.beside]).estimate();
   }
+}
+
+void add_unnamed_share(Diagnosis& d, const TransitionModel& model, const RankedCause& best, FitsWithout& without,
+                       const Fit& given, const Fit& recalibrated, const std::vector<double>& left,
+                       const DiagnosisOptions& options, const std::function<void()>& heartbeat) {
+  const auto named = [&](const EffectTerm& term) {
+    return std::ranges::any_of(d.causes.at_work, [&](const AtWork& one) {
+      return one.probability >= options.rules.least_at_work &&
+             std::ranges::find(one.effects, term.candidate->id) != one.effects.end();
+    });
+  };
+  std::vector<EffectTerm> kept;
+  std::size_t place = 0;
+  for (std::size_t k = 0; k < best.fit.terms.size(); ++k)
+    if (named(best.fit.terms[k])) {
+      kept.push_back(best.fit.terms[k]);
+    } else {
+      d.causes.stand_ins.push_back(best.fit.terms[k].candidate->id);
+      place = k;
+    }
+  d.causes.unnamed_share = std::max(0.0, 1 - *d.shrinkage.measures.front().closed);
+  if (d.causes.stand_ins.empty() || kept.empty()) return;
+  heartbeat();
+  Fit others;
+  if (d.causes.stand_ins.size() > 1) others = fit(model, best.fit.nuisance, kept);
+  const Fit& rest = d.causes.stand_ins.size() > 1 ? others : without.term(place, heartbeat);
+  const std::vector<ClosedShare> closed =
+      parts_closed(model, recalibrated, {&best.fit, &given, left}, {{&best.fit, &rest, true}}, options.folds,
+                   options.threads, options.seed, heartbeat);
+  *d.causes.unnamed_share += std::max(0.0, closed.front().value);
 }
 
 }  // namespace metastable::analysis

@@ -15,7 +15,8 @@ class FitsWithout;
 
 /// Lists the effects of the likeliest hypotheses by their probability of being at work, each over all hypotheses that
 /// hold it, with or without something unnamed; where none of the effects that act alike is at work by itself they are
-/// one group, and so are effects of one of `groups` that stand in each other's place.
+/// one group, and so are effects that stand in each other's place: those of one of `groups` and, where nothing else is
+/// likely to stay, those of sets of several that differ in them alone and fit the data as well.
 /// @param alike  Diagnosis::Causes::alike  @param groups  TransitionModel::groups()
 std::vector<AtWork> list_at_work(const Probabilities& probabilities, const Odds& unnamed,
                                  const std::vector<std::string>& alike, const std::vector<EffectGroup>& groups,
@@ -36,6 +37,12 @@ std::vector<UnnamedFacet> facets_by_probability(const Chosen& chosen, double p_u
 /// @param left  HeldOutGap::left
 void add_closed_shares(std::vector<AtWork>& at_work, const TransitionModel& model, const RankedCause& best,
                        FitsWithout& without, const Fit& given, const Fit& recalibrated, const std::vector<double>& left,
+                       const DiagnosisOptions& options, const std::function<void()>& heartbeat);
+
+/// Fills in Causes::stand_ins and Causes::unnamed_share of a gap that is partly explained.
+/// @param d  with what is at work and its held-out measures  @param best, without, given, left  as add_closed_shares()
+void add_unnamed_share(Diagnosis& d, const TransitionModel& model, const RankedCause& best, FitsWithout& without,
+                       const Fit& given, const Fit& recalibrated, const std::vector<double>& left,
                        const DiagnosisOptions& options, const std::function<void()>& heartbeat);
 
 }  // namespace metastable::analysis

@@ -438,6 +438,9 @@ Diagnosis answer(const TransitionModel& model, const Fitted& fitted, Decided dec
     add_closed_shares(d.causes.at_work, model, *best, *decided.without, fitted.given, fitted.recalibrated,
                       decided.held_out.left, options, [&] { progress(0.86, "what each effect closes"); });
     if (d.verdict == Verdict::partly_explained) doubt_effects(d, candidates);
+    if (d.verdict == Verdict::partly_explained)
+      add_unnamed_share(d, model, *best, *decided.without, fitted.given, fitted.recalibrated, decided.held_out.left,
+                        options, [&] { progress(0.86, "what has no name"); });
   }
 
   if (best && (d.verdict == Verdict::explained || d.verdict == Verdict::partly_explained))
@@ -470,7 +473,7 @@ Diagnosis answer(const TransitionModel& model, const Fitted& fitted, Decided dec
       d.sentences.begin() + static_cast<std::ptrdiff_t>(std::min<std::size_t>(d.sentences.size(), named ? 2 : 1));
   for (const std::string& note : d.data.notes)
     if (note.ends_with('?')) behind = std::next(d.sentences.insert(behind, "But a question comes first: " + note));
-  for (const AtBound& one : d.limits.at_bound) d.sentences.push_back(at_bound_in_words(one));
+  for (const AtBound& one : d.limits.at_bound) d.sentences.push_back(at_bound_in_words(one, cause.terms));
   return std::move(d);
 }
 

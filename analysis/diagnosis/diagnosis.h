@@ -179,7 +179,7 @@ struct Diagnosis {
     /// share one effect and the others are, at what the first's gains beside it. Empty where there is none.
     std::vector<std::string> alike;
     std::vector<StepwiseChoice> stepwise;  ///< what the field's usual selection names, for comparison
-    std::string size;                      ///< of the likeliest beside the nominal model, a sentence; or empty
+    std::string size;                      ///< TransitionModel::size_in_words() of the likeliest
     std::string even_push;                 ///< a sentence that says that a push, or one by a facet, fits as well; or ""
     /// These are probabilities. A gap has at least even odds where the tests find one, else at most even ones.
     double p_no_gap = 0, p_recalibrate = 0, p_none = 0;
@@ -187,6 +187,12 @@ struct Diagnosis {
     std::vector<AtWork> at_work;  ///< by falling probability
     std::vector<UnnamedFacet> unnamed_facets;  ///< likewise
     double p_unnamed = 0;                      ///< that something without a name is at work, alone or beside effects
+    /// Effects of the best hypothesis that are not at work beside others that are: something without a name is likelier
+    /// in their place.
+    std::vector<std::string> stand_ins;
+    /// Share of the held-out gap that has no name beside effects at work: what the best hypothesis leaves and what its
+    /// `stand_ins` close.
+    std::optional<double> unnamed_share;
   } causes;
 
   /// Says how far the gap shrinks.

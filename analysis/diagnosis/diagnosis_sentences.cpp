@@ -129,10 +129,14 @@ void say_what_stays(std::vector<std::string>& s, const Diagnosis& d) {
                         facet.stance ? "stances" : d.data.step_name + "s", facet.facet,
                         facet.size ? fmt::format(", {:+.2g} {}", *facet.size, facet.unit) : "");
   }
-  const bool known = !d.shrinkage.measures.empty() && d.shrinkage.measures[0].closed;
-  s.push_back(fmt::format("Something without a name stays{}, with probability {:.2f}.{}",
-                          known ? fmt::format(", {} of the gap", percent(1 - *d.shrinkage.measures[0].closed)) : "",
-                          d.causes.p_unnamed, where));
+  s.push_back(
+      fmt::format("Something without a name {}{}, with probability {:.2f}.{}",
+                  d.causes.stand_ins.empty() ? "stays" : "is at work, too",
+                  d.causes.unnamed_share ? fmt::format(", {} of the gap", percent(*d.causes.unnamed_share)) : "",
+                  d.causes.p_unnamed, where));
+  if (!d.causes.stand_ins.empty())
+    s.push_back(fmt::format("In its place the best model has {}, too unlikely to be named.",
+                            fmt::join(d.causes.stand_ins, " and ")));
   say_cost_of_ignoring(s, d);
 }
 
@@ -243,6 +247,11 @@ std::string where_in_words(const GapCell& cell, const std::string& step_name) {
                        cell.size < 0 ? "fewer" : "more");
   if (cell.aspect == "spread" && cell.unit == "correlation")
     return fmt::format("what the {}s of a trial have in common ({:+.2g} {})", step_name, cell.size, cell.unit);
+  if (cell.aspect == "spread" && cell.size >= 1)
+    return fmt::format("the spread of {} ({:.2g} times the model's)", at, 1 + cell.size);
+  if (cell.aspect == "spread")
+    return fmt::format("the spread of {} ({:.2g} % {} than the model's)", at, 100 * std::abs(cell.size),
+                       cell.size < 0 ? "less" : "more");
   return fmt::format("the {} of {} ({:+.2g} {})", cell.aspect, at, cell.size, cell.unit);
 }
 
@@ -268,8 +277,9 @@ void say_what_closes(std::vector<std::string>& s, const Diagnosis& d) {
           : fmt::format("from {:.2g} nats a {} to none", log_score.baseline, d.data.step_name);
   if (closed_is_known(log_score)) {
     const DecimalEstimate percent = to_decimal(closed_percent(log_score), NumberFormat::general, 3);
-    s.push_back(fmt::format("Held out, {} % of the gap closes (90 %: {} to {} %), {}.", plain_text(percent.value),
-                            plain_text(percent.lower), plain_text(percent.upper), change));
+    s.push_back(fmt::format("Held out, {} % of the gap closes (90 %: {} to {} %){}, {}.", plain_text(percent.value),
+                            plain_text(percent.lower), plain_text(percent.upper),
+                            d.causes.stand_ins.empty() ? "" : " in the best model", change));
   } else {
     s.push_back(
         fmt::format("Held out, the gap goes {}; the share that closes is {}.", change, closed_unknown(log_score)));

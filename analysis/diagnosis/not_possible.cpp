@@ -99,12 +99,12 @@ std::vector<NotPossible> not_possible(const TransitionModel& model, const Diagno
     const double steps = d.shrinkage.steps.with_effect, each = at_risk / trials;
     const bool known = std::isfinite(steps) && steps > 1;
     const char* ended = d.data.collides() ? "came to rest" : "failed";
-    all.push_back(
-        {"the observed steps before failure but for their lower end",
-         known ? fmt::format("no trial {} in {:.0f} {}s; the model expects one in {:.3g}", ended, at_risk,
-                             d.data.step_name, steps)
-               : fmt::format("no trial {} in {:.0f} {}s, and the model never does", ended, at_risk, d.data.step_name),
-         known ? whole(std::log1p(-surely) / (each * std::log1p(-1 / steps))) : std::nullopt});
+    all.push_back({"the observed steps before failure but for their lower end",
+                   known ? fmt::format("no trial {} in {:.0f} {}s; the model expects one in {:.3g}", ended, at_risk,
+                                       d.data.step_name, steps)
+                         : fmt::format("no trial {} in {:.0f} {}s, and none of those that the model draws", ended,
+                                       at_risk, d.data.step_name),
+                   known ? whole(std::log1p(-surely) / (each * std::log1p(-1 / steps))) : std::nullopt});
   }
   return all;
 }

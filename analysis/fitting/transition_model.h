@@ -228,7 +228,8 @@ class TransitionModel {
   /// Offers starts that the data themselves suggest for a fit of these terms, tried beside the usual one. The default
   /// offers none.
   virtual std::vector<FitStart> starts(std::span<const EffectTerm> terms) const;
-  /// Says how large effects are beside what the nominal model states, a sentence. The default says nothing.
+  /// Says how large effects are beside what the nominal model states, or that sizes are none that the effects can have,
+  /// a sentence. The default says nothing.
   virtual std::string size_in_words(std::span<const EffectTerm> terms) const;
   /// Returns [events] the probability of coming to rest after each event's collision, given what was measured before
   /// it; 0 for events of no collision. The default is 0 throughout.

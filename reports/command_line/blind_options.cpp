@@ -13,7 +13,8 @@ void declare_blind(Options& o) {
   o.add_place("DIR", "Folder of the run");
   o.add("sealed", "DIR", "", "Folder of the truths (default: DIR-sealed, beside the run)");
   o.add("seed", "SEED", "", "make: of all cases (default: from the system's entropy)");
-  o.add("per-effect", "N", "6", "make: cases of each effect at each of 1x, 2x, 4x, 0..1000");
+  o.add("per-effect", "N", "6",
+        "make: cases of each effect at each of 1, 2 and 4 times the size that just shows, 0..1000");
   o.add("none", "N", "300", "make: cases without a gap, 0..5000");
   o.add("pairs", "N", "50", "make: cases with two effects, 0..5000");
   o.add("outside", "N", "50", "make: cases with an effect that no catalogue holds, 0..5000");

@@ -55,7 +55,7 @@ void declare_compare(Options& o) {
   o.group("Question");
   o.add("slopes", "DEG,DEG,...", "7.02,9.59",
         "Ramp slopes [deg], each from 0.001 to below half the angle between legs; later ones are compared "
-        "with the first (default: 7.02 alone where something else is compared)");
+        "with the first; 7.02 alone where something else is compared");
   add_slope(o);
   add_launch(o, "Once per slope, in order");
   add_wheel(o), add_contact(o), add_course(o), add_study(o);

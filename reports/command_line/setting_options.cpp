@@ -125,8 +125,10 @@ void add_stated_wheel(Options& options) {
 void add_wheel(Options& options) {
   add_stated_wheel(options);
   options.add("ramp-stiffness", "N/M", "9000", "Stiffness of the ramp K_r [N/m] (published)", range::ramp_stiffness);
-  options.add("contact-mass", "KG", "", "Mass in the Kelvin-Voigt contact (25) [kg] (published; default: the hub mass)",
-              range::mass);
+  options.add(
+      "contact-mass", "KG", "",
+      "Mass in the spring and damper of a contact, equation 25 of the paper [kg] (published; default: the hub mass)",
+      range::mass);
   options.add("gravity", "M/S2", "9.81", "Gravity g [m/s^2]", range::gravity);
 }
 
@@ -142,7 +144,8 @@ void add_stated_contact(Options& options) {
 void add_contact(Options& options) {
   add_stated_contact(options);
   options.add("rebound-lost", "SHARE", "0", "Share of the rebound's energy lost in hops (coulomb)", shares);
-  options.add("correlation", "RHO", "0", "Of the normal scores of eta and mu", correlations);
+  options.add("correlation", "RHO", "0", "Correlation of eta and mu (of the normals that they are drawn by)",
+              correlations);
   options.add("contact-list", "FILE", "", "CSV 'restitution,friction': draw pairs from a list instead");
 }
 

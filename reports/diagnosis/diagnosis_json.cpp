@@ -130,13 +130,12 @@ Json at_work_json(const analysis::AtWork& one) {
               {"mean", interval_json(one.closes_mean)}}}}}};
 }
 
-// Lists where something without a name acts; what it would close is what stays, said of the likeliest place.
+// Lists where something without a name acts; the share of the gap that has no name is said of the likeliest place.
 Json unnamed_facets_json(const analysis::Diagnosis& d) {
   Json all = Json::array();
   for (const analysis::UnnamedFacet& one : d.causes.unnamed_facets) {
     Json closes = nullptr;
-    if (all.empty() && !d.shrinkage.measures.empty() && d.shrinkage.measures.front().closed)
-      closes = number(1 - *d.shrinkage.measures.front().closed);
+    if (all.empty() && d.causes.unnamed_share) closes = number(*d.causes.unnamed_share);
     all.push_back({{"facet", one.facet},
                    {"aspect", one.aspect},
                    {"of", one.stance ? "stances" : d.data.step_name + "s"},

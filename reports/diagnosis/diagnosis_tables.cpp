@@ -42,7 +42,7 @@ Cell unless_hopeless(double value) {
   return known_cell(value);
 }
 
-// Returns "leg 4, friction_ratio 0.879 (0.864 to 0.894)"; a list without its intervals.
+// Returns "leg 4, friction_ratio 0.879 (0.864 to 0.894)"; a list without its intervals, to the digits that they know.
 std::string parameters_text(const std::vector<EstimatedParameter>& parameters) {
   std::string text;
   for (std::size_t i = 0; i < parameters.size(); ++i) {
@@ -50,8 +50,11 @@ std::string parameters_text(const std::vector<EstimatedParameter>& parameters) {
     const bool goes_on = i > 0 && parameters[i - 1].name == p.name;
     const bool in_list = goes_on || (i + 1 < parameters.size() && parameters[i + 1].name == p.name);
     text += goes_on ? "; " : (text.empty() ? "" : ", ") + p.name + " ";
-    const bool interval = p.fitted && !in_list && !std::isnan(p.value + p.lower + p.upper);
-    text += interval ? format_estimate({p.value, p.lower, p.upper}, NumberFormat::general) : short_number(p.value);
+    const Estimate estimate{p.value, p.lower, p.upper};
+    const bool interval = p.fitted && !std::isnan(p.value + p.lower + p.upper);
+    text += !interval  ? short_number(p.value)
+            : !in_list ? format_estimate(estimate, NumberFormat::general)
+                       : plain_text(to_decimal(estimate, NumberFormat::general, 3).value);
   }
   return text;
 }

@@ -54,8 +54,8 @@ std::vector<analysis::CoastDownRun> read_runs(const CoastDownRequest& request, A
     analysis::CoastDownRun run = analysis::coast_down(named_log(path, runs), request.options);
     keep(run, request.blocks);
     answer.say(
-        "{}: {} revolutions from {:.4g} to {:.4g} rad/s, {} blocks; ticks missed {}, double {}, displaced {}; "
-        "{} revolutions left out",
+        "{}: {} revolutions from {:.4g} to {:.4g} rad/s, {} blocks; ticks of the counter missed {}, "
+        "doubled {}, displaced {}; {} revolutions left out",
         run.name, run.revolutions, run.top, request.options.stop, run.blocks.size(), run.missed, run.doubled,
         run.displaced, run.left_out);
     runs.push_back(std::move(run));
@@ -77,8 +77,8 @@ NominalLoss fitted_loss(const std::vector<analysis::CoastDownRun>& runs, bool fo
   if (runs.size() > 1) nominal.run_to_run = analysis::run_to_run_of(runs, linear);
   const std::string term = linear ? fmt::format(" + ({:.4g} +- {:.2g}) omega", nominal.linear, fit.linear_error) : "";
   answer.say(
-      "loss of omega^2 a revolution [rad^2/s^2]: {:.4g} +- {:.2g}{} + ({:.4g} +- {:.2g}) omega^2, noise sd {:.3g}; "
-      "{} of {} transitions beyond five of those",
+      "loss of omega^2 a revolution [rad^2/s^2]: {:.4g} +- {:.2g}{} + ({:.4g} +- {:.2g}) omega^2 (+- standard errors); "
+      "single revolutions scatter about that with sd {:.3g}, and {} of {} lie more than five sds away",
       nominal.constant, fit.constant_error, term, nominal.quadratic, fit.quadratic_error, nominal.noise_sd,
       fit.outliers, fit.transitions);
   return {nominal, "nominal loss fitted robustly to these runs"};

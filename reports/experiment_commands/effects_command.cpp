@@ -23,7 +23,7 @@ void list_effects(const std::vector<dynamics::EffectInfo>& all) {
   for (const dynamics::EffectInfo& info : all) {
     say("{}: {}\n", info.id, info.summary);
     for (const dynamics::EffectParameter& p : info.parameters)
-      say("  {:<20}{}{} ({})\n", p.name, p.meaning, p.per_leg ? ", one a leg" : "", range_text(p));
+      say("  {:<19} {}{} ({})\n", p.name, p.meaning, p.per_leg ? ", one a leg" : "", range_text(p));
   }
 }
 
