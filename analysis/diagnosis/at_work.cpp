@@ -238,7 +238,8 @@ void add_unnamed_share(Diagnosis& d, const TransitionModel& model, const RankedC
       place = k;
     }
   d.causes.unnamed_share = std::max(0.0, 1 - *d.shrinkage.measures.front().closed);
-  if (d.causes.stand_ins.empty() || kept.empty()) return;
+  if (kept.empty()) d.causes.stand_ins.clear();
+  if (d.causes.stand_ins.empty()) return;
   heartbeat();
   Fit others;
   if (d.causes.stand_ins.size() > 1) others = fit(model, best.fit.nuisance, kept);
@@ -246,7 +247,7 @@ void add_unnamed_share(Diagnosis& d, const TransitionModel& model, const RankedC
   const std::vector<ClosedShare> closed =
       parts_closed(model, recalibrated, {&best.fit, &given, left}, {{&best.fit, &rest, true}}, options.folds,
                    options.threads, options.seed, heartbeat);
-  *d.causes.unnamed_share += std::max(0.0, closed.front().value);
+  d.causes.unnamed_share = std::min(1.0, *d.causes.unnamed_share + std::max(0.0, closed.front().value));
 }
 
 }  // namespace metastable::analysis

@@ -6,6 +6,7 @@
 #include <array>
 #include <cmath>
 #include <functional>
+#include <map>
 #include <numbers>
 #include <optional>
 #include <utility>
@@ -22,17 +23,23 @@ constexpr double radians = std::numbers::pi / 180;
 // laboratory and of wheels under the laws omega^2 behind a stance less that before it scatters by no more than the same
 // taken a row off. In columns that stand a row off it is the other way round, by a factor of 5.
 constexpr double row_off = 0.35;
+constexpr std::size_t least_alike = 5;  // Stances of a ramp and a leg are held against their middle from so many on.
+constexpr double hardly_unequal =
+    1.05;  // Legs that nobody noted may differ by this ratio: theirs is the larger scatter.
 // Feet that hop hide energy in omega+: stances of engines gain up to 1.26 times what gravity gives. A slope is rarely
-// misread by more than 3 deg. Torques that resist take a tenth; a slope in per cent that is read in degrees, 0.43.
+// misread by more than 3 deg. Torques that resist take a tenth at 9 deg; a slope in per cent that is read in degrees
+// leaves 0.43.
 constexpr double least_gain = 0.7, questioned_gain = 1.5, refused_gain = 1.8, misread_slope = 3 * radians;
-// Of the same trials, stances last 0.99 to 1.02 times what their speeds say. Feet that hop shorten that to 0.87, and
+// The stances of these trials last 0.99 to 1.02 times what their speeds say. Feet that hop shorten that to 0.87, and
 // then omega^2 gains more than gravity gives.
 constexpr double time_room = 0.03, most_scatter = 0.1, too_long = 1.6;
-constexpr double slide_room = 1.1, two_steps = 1.8;  // of a distance between feet; sliding feet reach beyond both
+// Steps are in distances between feet; sliding feet reach beyond both.
+constexpr double slide_room = 1.1, two_steps = 1.8;
 
+// A stance between two collisions: its trial and the collision behind it (indices), and the speeds [rad/s] at its ends.
 struct MeasuredStance {
-  std::size_t trial = 0, behind = 0;  // the collision that ends it, an index
-  double from = 0, to = 0;            // speeds [rad/s]
+  std::size_t trial = 0, behind = 0;
+  double from = 0, to = 0;
 };
 
 std::vector<MeasuredStance> measured_stances(const Experiment& experiment) {
@@ -73,23 +80,36 @@ double gain_share(const Experiment& experiment, const std::vector<MeasuredStance
   return median(std::move(share));
 }
 
+// Returns how far the gains of omega^2 lie from the middle of those on the same ramp and the same noted leg, where
+// omega_plus is taken so many rows on; nothing for too few of them.
+std::optional<double> scatter_of_gains(const Experiment& experiment, int off) {
+  std::map<std::pair<std::size_t, int>, std::vector<double>> alike;  // by condition and leg
+  for (const MeasuredTrial& trial : experiment.trials) {
+    const auto& rows = trial.collisions;
+    for (std::size_t k = 0; k < rows.size(); ++k) {
+      const std::size_t end = k + static_cast<std::size_t>(1 + off);
+      if (end < rows.size() && rows[k].omega_plus && *rows[k].omega_plus > 0)
+        alike[{trial.condition, rows[k].leg.value_or(-1)}].push_back(rows[end].omega_minus * rows[end].omega_minus -
+                                                                     *rows[k].omega_plus * *rows[k].omega_plus);
+    }
+  }
+  std::vector<double> distances;
+  for (const auto& [where, gains] : alike) {
+    if (gains.size() < least_alike) continue;
+    const double middle = median(gains);
+    for (const double gain : gains) distances.push_back(std::abs(gain - middle));
+  }
+  return distances.size() < least_stances_to_judge ? std::nullopt : std::optional(median(std::move(distances)));
+}
+
 // Says by how many rows omega_plus seems to stand off: -1 where a row has that of the collision before.
 std::optional<int> rows_off(const Experiment& experiment) {
-  const auto scatter = [&](int off) {
-    std::vector<double> gains;
-    for (const MeasuredTrial& trial : experiment.trials) {
-      const auto& rows = trial.collisions;
-      for (std::size_t k = 0; k < rows.size(); ++k) {
-        const std::size_t end = k + static_cast<std::size_t>(1 + off);
-        if (end < rows.size() && rows[k].omega_plus && *rows[k].omega_plus > 0)
-          gains.push_back(rows[end].omega_minus * rows[end].omega_minus - *rows[k].omega_plus * *rows[k].omega_plus);
-      }
-    }
-    return gains.size() < least_stances_to_judge ? std::nullopt : std::optional(median_deviation(std::move(gains)));
-  };
-  const auto as_given = scatter(0);
+  const auto [shortest, longest] = std::ranges::minmax(experiment.wheel.leg_length);
+  if (experiment.columns.leg == Presence::none && longest > hardly_unequal * shortest) return std::nullopt;
+  const auto as_given = scatter_of_gains(experiment, 0);
   for (const int off : {-1, 1})
-    if (const auto other = scatter(off); as_given && other && *other < row_off * *as_given) return off;
+    if (const auto other = scatter_of_gains(experiment, off); as_given && other && *other < row_off * *as_given)
+      return off;
   return std::nullopt;
 }
 
@@ -111,9 +131,9 @@ class Durations {
       ramps_.push_back(on);
     }
   }
-  // Nothing where the wheel nearly stops, so that small errors decide.
+  // Returns nothing if the wheel nearly stops, because small errors then decide.
   std::optional<std::array<double, 2>> of(const MeasuredStance& stance) const {
-    constexpr double least_share = 0.2;  // of the omega^2 at the end
+    constexpr double least_share = 0.2;  // It is a share of the omega^2 at the end.
     const OnRamp& on = ramps_[experiment_.trials[stance.trial].condition];
     const double width = experiment_.wheel.leg_angle() / pieces,
                  start = (stance.from * stance.from + stance.to * stance.to - on.usual) / 2;
@@ -131,20 +151,22 @@ class Durations {
   }
 
  private:
-  static constexpr int pieces = 40;  // of a stance, even in the angle
+  static constexpr int pieces = 40;  // A stance has so many, even in the angle.
   static double middle_of(int piece) { return (piece + 0.5) / pieces; }
+  // One ramp: the gains of omega^2 [rad^2/s^2], and the share of them that gravity has given in the middle of each
+  // piece.
   struct OnRamp {
-    double usual = 0, given = 0;             // gains of omega^2 [rad^2/s^2]
-    std::array<double, pieces> fallen = {};  // share of the gain that gravity has given in the middle of each piece
+    double usual = 0, given = 0;
+    std::array<double, pieces> fallen = {};
   };
   const Experiment& experiment_;
-  std::vector<OnRamp> ramps_;  // by condition
+  std::vector<OnRamp> ramps_;  // They are in the order of conditions.
 };
 
 void ask_about_times(const Experiment& experiment, const std::vector<MeasuredStance>& stances, double gain,
                      std::vector<std::string>& questions) {
   const Durations durations(experiment, stances);
-  std::array<std::vector<double>, 2> share;  // measured over expected
+  std::array<std::vector<double>, 2> share;  // It is the measured time over the expected one.
   std::size_t late = 0;
   const MeasuredStance* first = nullptr;
   double longest = 0;
@@ -207,8 +229,8 @@ void check_stances(const Experiment& experiment, const std::string& file, Defect
     const double given = gain_share(experiment, stances, [&](double slope) { return most_gain(experiment, slope); });
     return defects.add(
         file, {1, 1},
-        fmt::format("half of the stances raise omega^2 by {:.3g} times or more what gravity gives this wheel on the "
-                    "stated slope: speeds {:.2g} times too large are suspected, as by a misstated frame rate or unit",
+        fmt::format("half of the stances raise omega^2 by {:.3g} times what gravity gives this wheel on the stated "
+                    "slope, or more: speeds {:.2g} times too large are suspected, as by a misstated frame rate or unit",
                     given, std::sqrt(given)));
   }
   if (const auto off = rows_off(experiment))
@@ -230,9 +252,9 @@ std::vector<std::string> questions_on_stances(const Experiment& experiment) {
   const double stated = gain * inertia_share(experiment);
   if (gain > questioned_gain || stated < least_gain)
     questions.push_back(fmt::format(
-        "half of the stances raise omega^2 by {:.3g} times or {} what gravity gives this wheel on the stated "
-        "slope: are slope, leg lengths, inertia and the scale of the speeds right?",
-        stated, stated < least_gain ? "less" : "more"));
+        "half of the stances raise omega^2 by {:.3g} times what gravity gives this wheel on the stated slope, or {}: "
+        "are slope, leg lengths, inertia and the scale of the speeds right{}?",
+        stated, stated < least_gain ? "less" : "more", stated < least_gain ? ", or does a torque resist it" : ""));
   ask_about_times(experiment, stances, gain, questions);
   return questions;
 }

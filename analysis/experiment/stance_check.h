@@ -11,8 +11,8 @@
 namespace metastable::analysis {
 
 /// Reports, one line each, a column omega_plus_rad_s whose values belong to the row before or behind, and stances that
-/// gain so much more energy than gravity gives a wheel on this ramp that speeds must be in another scale. Nothing where
-/// fewer than 20 stances have a speed at both ends. O(collisions).
+/// gain so much more energy than gravity gives a wheel on this ramp that speeds must be in another scale. It reports
+/// nothing where fewer than 20 stances have a speed at both ends. O(collisions).
 /// @param experiment  of a rimless wheel
 void check_stances(const Experiment& experiment, const std::string& file, Defects& defects);
 

@@ -559,7 +559,7 @@ void BeliefStep<Most>::on_lattice(AfterStep<Most>& after, std::size_t trial, con
 template <int Most>
 void BeliefStep<Most>::step(std::span<const TransitionPlace> places, std::span<const Part> beliefs,
                             const std::function<void(std::size_t, AfterStep<Most>&)>& take) {
-  if (!sought_) seek_merged(places, beliefs);
+  seek(places, beliefs);
   std::vector<Matrix> roots, left;
   carried_.clear();
   for (std::size_t t = 0; t < places.size(); ++t) {

@@ -38,6 +38,10 @@ class BeliefStep {
   /// @param bent      parts stay bent in the scores of the lattice, which then are the last numbers of the vector
   /// @param outliers  share of steps whose scores are drawn outlier_width times as wide
   BeliefStep(MachineStepper& stepper, const ScorePlan& plan, std::size_t shared, bool bent, double outliers);
+  /// Seeks an offset that moves the state as a score does, once, by these beliefs; step() does so by its first ones.
+  void seek(std::span<const TransitionPlace> places, std::span<const Part> beliefs) {
+    if (!sought_) seek_merged(places, beliefs);
+  }
   /// Steps beliefs, all in a few calls of the machine's map, and hands on what comes of each, in their order.
   /// @param take  is given the number of the belief and its distribution after the step, which it may change
   void step(std::span<const TransitionPlace> places, std::span<const Part> beliefs,

@@ -29,7 +29,7 @@ struct StepPlace {
 struct InputCourse {
   bool code = false;     ///< it takes few values, all whole: there is nothing between them
   bool by_phase = true;  ///< it is the same wherever the phase is
-  bool changes = false;  ///< within a trial
+  bool changes = false;  ///< it changes within a trial
 };
 
 inline constexpr std::size_t input_lags = 3;  ///< steps of which StepPlace::inputs holds the inputs: 0, 1 and 2 before

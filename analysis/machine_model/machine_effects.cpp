@@ -29,7 +29,7 @@ constexpr double largest_memory = 0.9, all_noises = -1;
 // Zeros of sensors are known to a share of what a column spans, or to some of its errors.
 constexpr double usual_bias = 0.1, bias_errors = 3;
 constexpr double largest_share = 0.2;  // of outliers
-constexpr double longest_lag = 3;      // of an input [steps]
+constexpr double longest_lag = 3;      // Inputs act so many steps late at most.
 constexpr double widest_launch = 10;   // launches are off by so many of their stated sds at most, at least
 constexpr double launch_errors = 4;    // standard errors from which on first rows suggest a size by themselves
 

@@ -15,6 +15,7 @@ namespace {
 
 constexpr double least_share = 1e-9;  // of a column's spread, that is taken for its error where there is none
 constexpr double least_chance = 1e-300;
+constexpr double surely = 1 - 1e-12;  // A chance of failure counts no further.
 constexpr SeenValue out_of_reach{least_log_density, farthest_score, 1};
 
 bool unseen(const MachineRow& row) {
@@ -204,7 +205,7 @@ std::map<std::size_t, AfterStep<Most>> Follower<Most>::stepped_elsewhere(BeliefS
   std::vector<Part> beliefs;
   for (std::size_t t = 0; t < runs_.trials.size() && supposed_.wild > 0; ++t) {
     const std::vector<MachineRow>& rows = runs_.trials[t].rows;
-    if (rows.size() < 2) continue;
+    if (steps_of(runs_.trials[t]) == 0 || (rows.size() < 2 && !plan_.failing)) continue;
     bool shows = false;
     for (std::size_t j = 0; j < state_.size(); ++j) shows |= !stated_[j] && !std::isnan(rows.front().seen[j]);
     if (!shows) continue;
@@ -213,8 +214,14 @@ std::map<std::size_t, AfterStep<Most>> Follower<Most>::stepped_elsewhere(BeliefS
   }
   std::map<std::size_t, AfterStep<Most>> by_trial;
   if (!places.empty())
-    stepping.step(places, beliefs,
-                  [&](std::size_t i, AfterStep<Most>& after) { by_trial[places[i].trial] = std::move(after); });
+    stepping.step(places, beliefs, [&](std::size_t i, AfterStep<Most>& after) {
+      AfterStep<Most>& kept = by_trial[places[i].trial];
+      kept.failed = after.failed;
+      kept.failed_wide = after.failed_wide;
+      if (after.belief.parts().empty()) return;
+      kept.belief.parts().push_back(after.belief.collapsed());  // It is one wide normal, as it was before the step.
+      kept.belief.parts().front().log_weight = std::log1p(-std::min(failed_in(after), surely));
+    });
   return by_trial;
 }
 
@@ -296,7 +303,10 @@ Evaluation Follower<Most>::follow(const std::vector<Event>& events, std::vector<
       }
     if (places.empty()) break;
     std::map<std::size_t, AfterStep<Most>> elsewhere;
-    if (k == 0) elsewhere = stepped_elsewhere(stepping);
+    if (k == 0) {
+      stepping.seek(places, before);
+      elsewhere = stepped_elsewhere(stepping);
+    }
     stepping.step(places, before, [&](std::size_t i, AfterStep<Most>& after) {
       trial_ = places[i].trial;
       if (const auto other = elsewhere.find(trial_); other != elsewhere.end())

@@ -548,14 +548,14 @@ bool MachineTransitions::only_wild_rows(const Fit& recalibrated) const {
   const double gain =
       2 * (recalibrated.penalised - evaluate(values, {}).total() + nuisances_.back().cost(values.back()));
   const auto others = static_cast<double>(values.size() - 1);
-  return gain < others + chance_sds * std::sqrt(2 * others);
+  return others == 0 || gain < others + chance_sds * std::sqrt(2 * others);
 }
 
 std::vector<std::string> MachineTransitions::misstated(const Fit& recalibrated) const {
   const std::vector<std::size_t> slots = misstated_slots(*this, recalibrated.nuisance);
   if (slots.empty() && only_wild_rows(recalibrated))
     return {fmt::format(
-        "Nothing but the share of wild rows, {:.2g}, differs from the model as given: what is stated holds.",
+        "Nothing but the share of wild rows, {:.2g}, differs from the model as given by more than chance may make it.",
         share_of(recalibrated.nuisance.back()))};
   if (slots.empty()) return {};
   const Eigen::MatrixXd root = resolved_root(recalibrated.information);

@@ -12,11 +12,12 @@ namespace metastable::analysis {
 namespace {
 
 constexpr std::size_t most_legs = 32, stances_a_leg = 5;
-constexpr double clear_gain = 10;      // nats of one trial
-constexpr double least_evidence = 30;  // variances of a stance that legs differ by, a leg
-// Another order has to remove so much of what legs differ by: lengths that are off by chance do so once in 1e4 wheels.
+constexpr double clear_gain = 10;      // One trial has to gain so many nats.
+constexpr double least_evidence = 30;  // Legs have to differ by so many variances of a stance each.
+// Another order may leave this share of the squares between legs: lengths that are off by chance do so once in 1e4
+// wheels.
 constexpr double most_left = 0.1;
-constexpr double wild = 9;  // variances at which a residual counts no more
+constexpr double wild = 9;  // A residual of more variances counts as so many.
 
 // Leg j of the column has the stated length number first + j, or first - j.
 struct LegOrder {
@@ -25,9 +26,10 @@ struct LegOrder {
   int of(int leg, int legs) const { return ((backwards ? first - leg : first + leg) % legs + legs) % legs; }
 };
 
+// A stance by the leg of the column, and by how much it misses the next speed [rad/s].
 struct StanceMiss {
-  std::size_t leg = 0;  // of the column
-  double value = 0;     // of the next speed [rad/s]
+  std::size_t leg = 0;
+  double value = 0;
 };
 
 // Says by how much stances miss the next speed in that order of legs, by run.
@@ -55,8 +57,9 @@ std::vector<std::vector<StanceMiss>> stance_misses(const WheelRuns& measured, co
   return all;
 }
 
+// The sum of squares between legs, the variance within them, and the number of stances.
 struct BetweenLegs {
-  double squares = 0, variance = 0;  // between legs, a sum; within them
+  double squares = 0, variance = 0;
   std::size_t count = 0;
 };
 
@@ -93,7 +96,7 @@ std::optional<std::string> question_on_all(const WheelRuns& measured,
     for (int first = 0; first < legs; ++first) {
       const LegOrder order{first, backwards};
       if (const BetweenLegs b = between_legs(stance_misses(measured, order), size);
-          b.count > given.count / 2 && b.squares < least.squares)
+          b.count == given.count && b.squares < least.squares)
         best = order, least = b;
     }
   if (least.squares > most_left * given.squares ||
@@ -127,11 +130,13 @@ std::optional<std::string> question_on_some(const WheelRuns& measured, const Exp
     for (std::size_t t = 0; t < turned.size(); ++t)
       if (turned[t].size() == noted[t].size()) best[t] = std::min(best[t], misfit(turned[t]));
   }
+  // The best of so many orders, in so many trials, gains the more by chance.
+  const double least_gain = clear_gain + std::log(static_cast<double>(best.size()) * measured.wheel.legs());
   std::vector<int> others;
   std::size_t right = 0;
   for (std::size_t t = 0; t < best.size(); ++t) {
     right += !(best[t] < as_noted[t]);
-    if (best[t] < as_noted[t] - clear_gain && best[t] < static_cast<double>(noted[t].size()))
+    if (best[t] < as_noted[t] - least_gain && best[t] < static_cast<double>(noted[t].size()))
       others.push_back(experiment.trials[t].number);
   }
   if (others.empty() || 2 * right < best.size()) return std::nullopt;

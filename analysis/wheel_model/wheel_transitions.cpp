@@ -336,9 +336,8 @@ std::string WheelTransitions::size_in_words(std::span<const EffectTerm> terms) c
       if (term.candidate->id == drag && term.values.front() < 0) driving.push_back(drag);
   if (driving.empty()) return {};
   return fmt::format(
-      "A negative {} would drive the wheel, and no drag does: something acts alike. Are slope, inertia and the scale "
-      "of "
-      "the speeds as stated?",
+      "A negative {} would drive the wheel, and no drag does: something acts alike. "
+      "Are slope, inertia and the scale of the speeds as stated?",
       fmt::join(driving, " and "));
 }
 

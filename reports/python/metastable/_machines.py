@@ -64,8 +64,11 @@ def _turning(step, at):
 
 
 def _unwrapped(values, state, index, names, about):
-    """An angle that goes on beyond a turn along each trial, from within pi of `about`, if this is known."""
+    """An angle that goes on beyond a turn along each trial, from within pi of `about`, or of the middle of all first ones."""
     values = values.copy()
+    if about is None:  # Trials that are written in different turns begin in one.
+        first = [own[0] for own in (values[(index == trial) & numpy.isfinite(values)] for trial in range(len(names))) if len(own)]
+        about = math.atan2(numpy.sin(first).sum(), numpy.cos(first).sum()) if first else 0
     for trial in range(len(names)):
         begin, end = numpy.searchsorted(index, [trial, trial + 1])
         known = numpy.flatnonzero(numpy.isfinite(values[begin:end]))
@@ -77,7 +80,7 @@ def _unwrapped(values, state, index, names, about):
         if not len(known):
             continue
         one = values[begin + known]
-        one[0] = one[0] if about is None else about + _within_half_a_turn(one[0] - about)
+        one[0] = about + _within_half_a_turn(one[0] - about)
         values[begin + known] = one[0] + numpy.concatenate([[0], numpy.cumsum(_within_half_a_turn(numpy.diff(one)))])
     return values
 

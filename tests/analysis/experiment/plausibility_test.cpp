@@ -74,7 +74,7 @@ TEST_F(PlausibilityTest, SuspectsFrameRatesAndDiameters) {
   using C = dynamics::TrialCollision;
   expect_suspected("speeds doubled by a misstated frame rate",
                    [](C& c) { c.omega_minus *= 2, c.omega_plus *= 2, c.time /= 2; });
-  setting_.law = dynamics::Law::published;  // slower
+  setting_.law = dynamics::Law::published;  // Its wheels are slower.
   trials_ = simulate_trials(setting_, {.trials = 10, .seed = 3});
   expect_suspected("speeds halved by a misstated frame rate",
                    [](C& c) { c.omega_minus /= 2, c.omega_plus /= 2, c.time *= 2; });

@@ -7,6 +7,8 @@
 #include <vector>
 
 #include "analysis/experiment/experiment_folder.h"
+#include "analysis/experiment/laboratory_experiment.h"
+#include "analysis/experiment/stand_in.h"
 #include "tests/analysis/settings.h"
 
 namespace metastable::analysis {
@@ -77,16 +79,43 @@ TEST(StanceCheck, SuspectsSpeedsAfterThatStandARowOff) {
   EXPECT_NE(late.find("one row late"), std::string::npos) << late;
 }
 
+// Stances on ramps of other slopes, and over legs of other lengths, gain another energy by themselves.
+TEST(StanceCheck, ComparesStancesOfOneRampAndOneLeg) {
+  std::vector<LaboratoryCondition> conditions = stand_in_conditions(stand_in_setting());
+  const auto stand_in = [&](const LaboratoryOptions& reality) {
+    const dynamics::LaboratorySetup setup = laboratory_setup(conditions, reality);
+    const ExperimentFiles files = laboratory_files(conditions, setup, run_laboratory(setup, 0), {}).files;
+    return parse_experiment({"lab", files.experiment_toml, files.collisions_csv, files.trials_csv, {}});
+  };
+  Experiment late = stand_in({.sensor_noise = 0.008, .seed = 3});
+  EXPECT_EQ(refusal(late), "");
+  for (MeasuredTrial& trial : late.trials)
+    for (std::size_t k = trial.collisions.size() - 1; k > 0; --k)
+      trial.collisions[k].omega_plus = trial.collisions[k - 1].omega_plus;
+  EXPECT_NE(refusal(late).find("one row late"), std::string::npos);
+  Setting odd = paper_setting(25, false);
+  odd.law = dynamics::Law::coulomb;
+  odd.wheel.leg_length = {0.15, 0.17, 0.16, 0.155, 0.165};
+  odd.restitution = {0.2, 0.02};
+  odd.friction = {0.8, 0.05};
+  odd.ramp_length = 100;
+  odd.initial_speed = {8, 0.3};
+  const Experiment unequal =
+      parse_experiment(source_of(experiment_files(odd, simulate_trials(odd, {.trials = 20, .seed = 3}), "t", {}), ""));
+  EXPECT_EQ(refusal(unequal), "");
+}
+
 // A frame rate stated at twice its value doubles speeds and halves times, which agree: gravity tells.
 TEST(StanceCheck, RefusesSpeedsThatGravityDoesNotGive) {
   const std::string doubled = refusal(spoilt([](Rows& rows) { scale(rows, 2, 0.5); }));
   EXPECT_NE(doubled.find("speeds 2 times too large are suspected"), std::string::npos) << doubled;
   EXPECT_EQ(refusal(spoilt([](Rows& rows) { scale(rows, 1.1, 1 / 1.1); })), "");
   const std::string more = question(spoilt([](Rows& rows) { scale(rows, 1.3, 1 / 1.3); }));
-  EXPECT_NE(more.find("or more what gravity gives"), std::string::npos) << more;
+  EXPECT_NE(more.find("gives this wheel on the stated slope, or more: "), std::string::npos) << more;
   Experiment percent = rolled(dynamics::Law::published);
   percent.conditions[0].slope_deg = 16.9;
-  EXPECT_NE(question(percent).find("or less what gravity gives"), std::string::npos) << question(percent);
+  EXPECT_NE(question(percent).find("gives this wheel on the stated slope, or less: "), std::string::npos)
+      << question(percent);
 }
 
 // An inertia that is off was named with probability 1.

@@ -105,13 +105,13 @@ class Angles(unittest.TestCase):
     def test_that_wrap_get_the_answer_of_those_that_go_on(self):
         answers = [metastable.diagnose(metastable.runs(machine, trial=self.trial, angle_rad=angle), machine)
                    for machine, angle in [(spinner((), False), self.angle),
-                                          (spinner("angle_rad", True), self.angle % (2 * np.pi))]]
+                                          (spinner("angle_rad", True), self.angle % (2 * np.pi) + 2 * np.pi * (self.trial % 3))]]
         for answer in answers:
             self.assertEqual((answer.verdict, answer.at_work[0].effects), ("explained", ("pull",)))
             low, high = answer.at_work[0].interval_90.pull
             self.assertLess(abs(answer.at_work[0].parameters.pull - 0.2), high - low)
         for ours, other in zip(*(answer.at_work[0].interval_90.pull for answer in answers)):
-            self.assertAlmostEqual(ours, other, 6)
+            self.assertAlmostEqual(ours, other, 4)
 
     def test_that_are_lost_for_a_while_are_refused(self):
         angle = self.angle.copy()
