@@ -26,9 +26,9 @@ constexpr double least_time_share = 0.15, most_time_share = 1.5;
 // A step is a chord, up to 1.4 where feet slide, 1.00 to 1.04 in the middle of what engines roll. Lengths of legs that
 // are diameters make it half of one, two legs of eight that are not listed 0.76.
 constexpr double least_step_share = 0.85, most_step_share = 1.6;
-constexpr double end_room = 2.5;       // chords by which a position may lie beyond the ramp's end
-constexpr double most_lifting = 1.25;  // wheels whose feet lift at most steps are not rolling
-constexpr double ramp_room = 1.02;     // a ramp is measured to two per cent
+constexpr double end_room = 2.5;       // A position may lie so many chords beyond the ramp's end.
+constexpr double most_lifting = 1.25;  // Wheels whose feet lift at most steps are not rolling.
+constexpr double ramp_room = 1.02;     // A ramp is measured to two per cent.
 
 // A wheel that turns about its foot has the energy J omega^2 / 2, J = I + M L^2 of that foot. A collision adds none, so
 // that it keeps at most the square root of the two J's ratio of the speed, which is never more than the longest leg
@@ -236,8 +236,7 @@ class Plausible {
     const dynamics::Wheel& wheel = experiment_.wheel;
     const double kept = std::max(0.75, std::pow(std::cos(wheel.leg_angle()), 2));
     const double slope = experiment_.conditions[condition].slope_deg * turn / 360;
-    return std::sqrt(4 * wheel.gravity * std::sin(wheel.leg_angle() / 2) * std::sin(slope) /
-                     (wheel.mean_leg_length() * (1 - kept)));
+    return std::sqrt(most_stance_gain(wheel, slope) / (1 - kept));
   }
   double typical_speed() const {
     std::vector<double> all;

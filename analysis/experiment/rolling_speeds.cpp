@@ -19,4 +19,8 @@ RollingSpeeds rolling_speeds(const Experiment& experiment, std::size_t condition
           .fastest = 3 * lifting};
 }
 
+double most_stance_gain(const dynamics::Wheel& wheel, double slope) {
+  return 4 * wheel.gravity * std::sin(wheel.leg_angle() / 2) * std::sin(slope) / wheel.mean_leg_length();
+}
+
 }  // namespace metastable::analysis

@@ -25,4 +25,8 @@ struct RollingSpeeds {
 /// @param condition  index, of a rimless wheel
 RollingSpeeds rolling_speeds(const Experiment& experiment, std::size_t condition);
 
+/// Returns by how much gravity raises omega^2 in a stance [rad^2/s^2], 4 g sin(alpha/2) sin(gamma) / L, if all mass of
+/// the wheel is in its hub; with more inertia it is less. @param slope  gamma [rad]
+double most_stance_gain(const dynamics::Wheel& wheel, double slope);
+
 }  // namespace metastable::analysis

@@ -11,6 +11,7 @@
 #include <optional>
 #include <utility>
 
+#include "analysis/experiment/rolling_speeds.h"
 #include "analysis/statistics/median.h"
 
 namespace metastable::analysis {
@@ -57,12 +58,6 @@ double slope_of(const Experiment& experiment, std::size_t trial) {
   return experiment.conditions[experiment.trials[trial].condition].slope_deg * radians;
 }
 
-// Returns by how much gravity raises omega^2 in a stance on this slope [rad], of a wheel whose mass is all in its hub.
-double most_gain(const Experiment& experiment, double slope) {
-  const dynamics::Wheel& wheel = experiment.wheel;
-  return 4 * wheel.gravity * std::sin(wheel.leg_angle() / 2) * std::sin(slope) / wheel.mean_leg_length();
-}
-
 // Returns the stated inertia about the foot over that of a wheel whose mass is all in its hub.
 double inertia_share(const Experiment& experiment) {
   const dynamics::Wheel& wheel = experiment.wheel;
@@ -81,9 +76,9 @@ double gain_share(const Experiment& experiment, const std::vector<MeasuredStance
 }
 
 // Returns how far the gains of omega^2 lie from the middle of those on the same ramp and the same noted leg, where
-// omega_plus is taken so many rows on; nothing for too few of them.
+// omega_plus is taken so many rows on. It returns nothing for too few of them.
 std::optional<double> scatter_of_gains(const Experiment& experiment, int off) {
-  std::map<std::pair<std::size_t, int>, std::vector<double>> alike;  // by condition and leg
+  std::map<std::pair<std::size_t, int>, std::vector<double>> alike;  // They are by condition and leg.
   for (const MeasuredTrial& trial : experiment.trials) {
     const auto& rows = trial.collisions;
     for (std::size_t k = 0; k < rows.size(); ++k) {
@@ -123,7 +118,7 @@ class Durations {
     const double half = experiment.wheel.leg_angle() / 2;
     for (std::size_t c = 0; c < gains.size(); ++c) {
       const double slope = experiment.conditions[c].slope_deg * radians;
-      OnRamp on{gains[c].empty() ? 0 : median(std::move(gains[c])), most_gain(experiment, slope), {}};
+      OnRamp on{gains[c].empty() ? 0 : median(std::move(gains[c])), most_stance_gain(experiment.wheel, slope), {}};
       for (int i = 0; i < pieces; ++i)
         on.fallen[static_cast<std::size_t>(i)] =
             (std::cos(half - slope) - std::cos(slope + half * (2 * middle_of(i) - 1))) /
@@ -189,7 +184,7 @@ void ask_about_times(const Experiment& experiment, const std::vector<MeasuredSta
         fmt::format("time_s and the speeds contradict each other: stances last {:.3g} times as long as the "
                     "speeds at their ends say; are frame rate, clock, scale and offset of the speeds right?",
                     least > 1 ? least : most));
-  else if (late > 0 && questions.empty())  // a step that is too long has asked already
+  else if (late > 0 && questions.empty())  // A step that is too long has asked already.
     questions.push_back(fmt::format(
         "time_s: {} of {} stances last more than {} times as long as the speeds at their ends say, up to {:.3g} s, the "
         "first of them before collision {} of trial {}: does the clock jump, or is a collision missing?",
@@ -200,7 +195,7 @@ void ask_about_times(const Experiment& experiment, const std::vector<MeasuredSta
 void ask_about_positions(const Experiment& experiment, std::vector<std::string>& questions) {
   const double apart = 2 * experiment.wheel.mean_leg_length() * std::sin(experiment.wheel.leg_angle() / 2);
   std::vector<double> steps;
-  std::vector<std::pair<int, int>> long_ones;  // trial, collision
+  std::vector<std::pair<int, int>> long_ones;  // They are trials with their collisions.
   for (const MeasuredTrial& trial : experiment.trials)
     for (std::size_t k = 1; k < trial.collisions.size(); ++k) {
       const MeasuredCollision &last = trial.collisions[k - 1], &next = trial.collisions[k];
@@ -210,7 +205,7 @@ void ask_about_positions(const Experiment& experiment, std::vector<std::string>&
     }
   if (long_ones.empty() || steps.size() < least_stances_to_judge) return;
   const auto beyond = std::ranges::count_if(steps, [](double step) { return step > slide_room; });
-  if (static_cast<std::size_t>(beyond) > 2 * long_ones.size()) return;  // its feet slide
+  if (static_cast<std::size_t>(beyond) > 2 * long_ones.size()) return;  // Its feet slide.
   questions.push_back(
       fmt::format("position_m: {} of {} steps are longer than {} times the {:.3g} m between its feet, the first of "
                   "them before collision {} of trial {}: is a collision missing?",
@@ -223,10 +218,11 @@ void check_stances(const Experiment& experiment, const std::string& file, Defect
   const std::vector<MeasuredStance> stances = measured_stances(experiment);
   if (stances.size() < least_stances_to_judge || !defects.empty()) return;
   const double share = gain_share(experiment, stances, [&](double slope) {
-    return most_gain(experiment, std::min(slope + misread_slope, std::numbers::pi / 2));
+    return most_stance_gain(experiment.wheel, std::min(slope + misread_slope, std::numbers::pi / 2));
   });
   if (share > refused_gain) {
-    const double given = gain_share(experiment, stances, [&](double slope) { return most_gain(experiment, slope); });
+    const double given =
+        gain_share(experiment, stances, [&](double slope) { return most_stance_gain(experiment.wheel, slope); });
     return defects.add(
         file, {1, 1},
         fmt::format("half of the stances raise omega^2 by {:.3g} times what gravity gives this wheel on the stated "
@@ -248,7 +244,8 @@ std::vector<std::string> questions_on_stances(const Experiment& experiment) {
   ask_about_positions(experiment, questions);
   const std::vector<MeasuredStance> stances = measured_stances(experiment);
   if (stances.size() < least_stances_to_judge) return questions;
-  const double gain = gain_share(experiment, stances, [&](double slope) { return most_gain(experiment, slope); });
+  const double gain =
+      gain_share(experiment, stances, [&](double slope) { return most_stance_gain(experiment.wheel, slope); });
   const double stated = gain * inertia_share(experiment);
   if (gain > questioned_gain || stated < least_gain)
     questions.push_back(fmt::format(
