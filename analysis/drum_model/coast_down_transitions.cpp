@@ -100,6 +100,9 @@ class CoastDownTransitions : public TransitionModel {
   const std::vector<Nuisance>& nuisances() const override { return nuisances_; }
   const std::vector<Candidate>& candidates() const override { return candidates_; }
   std::string step_name() const override { return "revolution"; }
+  std::string unit_of(const std::string& effect, const std::string& parameter) const override {
+    return dynamics::effect_unit(effect, parameter);
+  }
   std::vector<EffectGroup> groups() const override {
     return {{"a torque that grows with speed", {"axle_drag_viscous", "air_drag"}},
             {"a constant or growing torque", {"rolling_resistance", "axle_drag_viscous", "air_drag"}},

@@ -189,6 +189,8 @@ class TransitionModel {
   /// Names what Event::leg is the number of, and says which one.
   virtual std::string leg_name() const { return "leg"; }
   virtual std::string leg_word(int leg) const;
+  /// Returns the unit of an effect's parameter as it is reported; "" for a ratio, and where no unit is known.
+  virtual std::string unit_of(const std::string& /*effect*/, const std::string& /*parameter*/) const { return ""; }
   /// Names the unit in which Event::position is measured.
   virtual std::string position_unit() const { return "m"; }
   /// Says what a recalibration refits, in words that "remove" can follow.

@@ -6,6 +6,7 @@
 #include <cstdint>
 #include <functional>
 #include <limits>
+#include <map>
 #include <memory>
 #include <optional>
 #include <span>
@@ -88,6 +89,11 @@ struct Machine {
   /// A call of `step` costs much more than a row, as where an interpreter runs it.
   bool dear = false;
   double most_wild = 0.01;  ///< largest share of rows that may be wild (missed events, bad tracks), [0, 0.2]
+  std::map<std::string, std::string> units;  ///< of states and values whose names do not end in theirs
+
+  /// Returns the unit of a state or value: the one stated, else the one that its name ends in ("swing_rad_s": rad/s;
+  /// "per_m": 1/m); "" where there is none.
+  std::string unit_of(const std::string& name) const;
 
   /// Names what MachineBatch::values holds, in order: parameters, the effects' parameters, inputs.
   std::vector<std::string> value_names() const;

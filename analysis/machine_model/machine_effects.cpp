@@ -432,4 +432,21 @@ std::vector<MachineCandidate> machine_effects(const Machine& machine, std::share
   return all;
 }
 
+std::string machine_effect_unit(const Machine& machine, const std::string& effect, const std::string& parameter) {
+  for (const MachineEffect& suspected : machine.effects)
+    if (suspected.id == effect) return machine.unit_of(parameter);
+  for (const char* plain : {"correlation", "noise_number", "share", "steps"})
+    if (parameter == plain) return "";
+  for (const char* place : {"frequency_hz", "from_m", "to_m"})
+    if (parameter == place) return Machine{}.unit_of(parameter);
+  // The names of such effects begin with the parameter or end with the state that they change.
+  std::string changed;
+  for (const std::string& varying : machine.may_vary)
+    if (effect.starts_with(varying + "_") && varying.size() > changed.size()) changed = varying;
+  const bool varies = !changed.empty();
+  for (const std::string& state : machine.states)
+    if (!varies && effect.ends_with("_" + state) && state.size() > changed.size()) changed = state;
+  return machine.unit_of(changed);
+}
+
 }  // namespace metastable::analysis

@@ -2,6 +2,7 @@
 // The effects of a machine as they are fitted: those that its user suspects, and those that any machine may have.
 
 #include <memory>
+#include <string>
 #include <vector>
 
 #include "analysis/fitting/transition_model.h"
@@ -24,5 +25,9 @@ struct MachineCandidate {
 /// scatter more than it is stated) for each state that is measured or whose launch is stated. Those that the runs
 /// cannot show say why.
 std::vector<MachineCandidate> machine_effects(const Machine& machine, std::shared_ptr<const MachineDesign> design);
+
+/// Returns the unit of a parameter that such an effect reports, by Machine::unit_of() of what the effect changes; ""
+/// for a ratio, a share and a number of steps.
+std::string machine_effect_unit(const Machine& machine, const std::string& effect, const std::string& parameter);
 
 }  // namespace metastable::analysis

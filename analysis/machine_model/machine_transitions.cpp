@@ -143,8 +143,12 @@ class MachineTransitions : public TransitionModel {
   std::string recalibrated() const override { return "parameters"; }
   std::vector<ObservedColumn> columns() const override {
     std::vector<ObservedColumn> all;
-    for (const MachineSensor& sensor : machine_->observe) all.push_back({sensor.state, ""});
+    for (const MachineSensor& sensor : machine_->observe)
+      all.push_back({sensor.state, machine_->unit_of(sensor.state)});
     return all;
+  }
+  std::string unit_of(const std::string& effect, const std::string& parameter) const override {
+    return machine_effect_unit(*machine_, effect, parameter);
   }
   std::string leg_name() const override { return "phase"; }
   std::string leg_word(int leg) const override { return "phase " + runs_.phases.at(static_cast<std::size_t>(leg)); }

@@ -1,6 +1,7 @@
 #include "analysis/statistics/minimize.h"
 
 #include <Eigen/Core>
+#include <cmath>
 
 namespace metastable::analysis {
 
@@ -17,6 +18,11 @@ Minimum quasi_newton(const SmoothFunction& function, const std::vector<double>& 
   };
   Eigen::VectorXd x = Eigen::Map<const Eigen::VectorXd>(start.data(), n), g, next_g;
   double value = evaluate(x, g);
+  if (!std::isfinite(value)) {
+    result.at = start;
+    result.value = value;
+    return result;
+  }
   Eigen::MatrixXd inverse = Eigen::MatrixXd::Identity(n, n);
   bool fresh = true;  // `inverse` is the start's
   while (result.evaluations < most) {

@@ -18,7 +18,8 @@ using SmoothFunction = std::function<double(const std::vector<double>& at, std::
 
 /// Descends by quasi-Newton steps (BFGS; Nocedal and Wright 2006, ch. 6), for variables in which the function changes
 /// by about 1 over about 1. Stops when a Newton step promises less than `tolerance` (absolute), when no step along it
-/// falls, or at `most` evaluations. The function may return +infinity outside its domain, not at `start`.
+/// falls, or at `most` evaluations. The function may return +infinity outside its domain; where `start` is outside, its
+/// value comes back, not converged.
 Minimum quasi_newton(const SmoothFunction& function, const std::vector<double>& start, double tolerance, int most);
 
 }  // namespace metastable::analysis

@@ -49,8 +49,9 @@ class Profile {
 
   /// Returns sqrt(2 (profile - least)) at a value of the variable.
   double operator()(double value) {
-    std::optional<Minimum> best = descend(along(path_, value));
-    // Starts another branch from the points of other profiles on either side.
+    const Eigen::VectorXd start = along(path_, value);
+    std::optional<Minimum> best = descend(start);
+    // Another branch may start from the points of other profiles on either side, unless it begins in the same valley.
     const Eigen::VectorXd *below = nullptr, *above = nullptr;
     for (const Eigen::VectorXd& x : visited_) {
       const double here = x[variable_];
@@ -58,7 +59,9 @@ class Profile {
       if (here > value && (!above || here < (*above)[variable_])) above = &x;
     }
     if (below && above) {
-      std::optional<Minimum> other = descend(along({*below, *above}, value));
+      const Eigen::VectorXd from = along({*below, *above}, value);
+      std::optional<Minimum> other;
+      if (!best || contours_between(start, from) > off_the_guess) other = descend(from);
       if (other && (!best || other->value < best->value - lower_by)) best = std::move(other);
     }
     if (!best) return std::numeric_limits<double>::infinity();
@@ -93,6 +96,11 @@ class Profile {
     return x;
   }
 
+  // Returns the distance of two points in lengths of the axes.
+  double contours_between(const Eigen::VectorXd& a, const Eigen::VectorXd& b) const {
+    return (axes_.transpose() * (b - a)).cwiseQuotient(axes_.colwise().squaredNorm().transpose()).norm();
+  }
+
   // Returns nothing where the cost is infinite.
   std::optional<Minimum> descend(const Eigen::VectorXd& start) const {
     const auto point = [&](const std::vector<double>& z) {
@@ -108,10 +116,9 @@ class Profile {
       return cost;
     };
     const auto count = static_cast<std::size_t>(axes_.cols());
-    std::vector<double> from(count, off_the_guess), unused(count);
-    if (!std::isfinite(along_axes(from, unused))) from.assign(count, 0.0);
-    if (!std::isfinite(along_axes(from, unused))) return std::nullopt;
-    Minimum best = quasi_newton(along_axes, from, 1e-3, 200);
+    Minimum best = quasi_newton(along_axes, std::vector<double>(count, off_the_guess), 1e-3, 200);
+    if (!std::isfinite(best.value)) best = quasi_newton(along_axes, std::vector<double>(count, 0.0), 1e-3, 200);
+    if (!std::isfinite(best.value)) return std::nullopt;
     best.at = point(best.at);
     return best;
   }

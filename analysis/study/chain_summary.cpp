@@ -23,6 +23,7 @@ constexpr std::size_t violation_draws = 65536, launch_violation_draws = 4096, fe
 constexpr double least_violated = 1e-9;  // share of collisions at a state
 constexpr std::size_t slowest_draws = 16384;
 constexpr std::size_t most_forward = 100000;  // steps followed where some states never rest
+constexpr double still_resting = 1e-6;        // share of the launches that may be left to rest after them
 constexpr double same_chain = 1e-6;           // agreement wanted of two ways to solve it
 constexpr double same_spectrum = 1e-6;        // and of two ways to its lambda_1
 constexpr double frequent_rest = 0.01;        // a step
@@ -392,6 +393,7 @@ LaunchEnds launch_ends(const markov::SampledChain& sampled, const RollingStates&
 }
 
 // The launch followed forwards: survival until only those who never rest are left, visits of the first `shown` steps.
+// It throws markov::ConvergenceError where others are left after most_forward steps.
 struct ForwardCourse {
   std::vector<double> survival{1.0}, visits;
 };
@@ -402,13 +404,16 @@ ForwardCourse followed_course(const markov::SampledChain& sampled, double never,
   course.visits.assign(alive.size(), 0.0);
   for (std::size_t n = 1; n < most_forward; ++n) {
     const double surviving = std::min(course.survival.back(), std::accumulate(alive.begin(), alive.end(), 0.0));
-    if (n >= shown && surviving <= never * (1 + 1e-12)) break;
+    if (n >= shown && surviving <= never * (1 + 1e-12)) return course;
     course.survival.push_back(surviving);
     if (n < shown)
       for (std::size_t i = 0; i < course.visits.size(); ++i) course.visits[i] += alive[i];
     alive = markov::apply_left(sampled.chain, alive);
   }
-  return course;
+  if (const double left = course.survival.back() - never; left < still_resting) return course;
+  throw markov::ConvergenceError(
+      "endless study", course.survival.back() - never,
+      fmt::format("launches still come to rest after {} steps, beside others that never do", most_forward));
 }
 
 // Reads sd and quantiles of the steps off their survival.

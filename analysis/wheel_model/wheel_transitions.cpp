@@ -96,6 +96,9 @@ class WheelTransitions : public TransitionModel {
   const std::vector<Nuisance>& nuisances() const override { return nuisances_; }
   const std::vector<Candidate>& candidates() const override { return candidates_; }
   std::string step_name() const override { return "collision"; }
+  std::string unit_of(const std::string& effect, const std::string& parameter) const override {
+    return dynamics::effect_unit(effect, parameter);
+  }
   std::vector<std::string> effect_ids() const override { return dynamics::effect_ids(); }
   std::vector<EffectGroup> groups() const override { return wheel_groups(); }
   std::string recalibration_id() const override { return std::string(dynamics::contact_distribution_id); }

@@ -229,6 +229,14 @@ std::vector<std::string> effect_ids() {
   return ids;
 }
 
+std::string effect_unit(std::string_view effect, std::string_view parameter) {
+  for (const EffectInfo& info : effect_catalogue())
+    if (info.id == effect)
+      for (const EffectParameter& p : info.parameters)
+        if (p.name == parameter) return p.unit;
+  return "";
+}
+
 const EffectInfo& effect_info(std::string_view id) {
   const auto& all = effect_catalogue();
   const auto found = std::find_if(all.begin(), all.end(), [id](const EffectInfo& info) { return info.id == id; });

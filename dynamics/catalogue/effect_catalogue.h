@@ -47,6 +47,8 @@ const std::vector<EffectInfo>& effect_catalogue();
 std::vector<std::string> effect_ids();
 /// @throws std::invalid_argument naming the id and all known ones
 const EffectInfo& effect_info(std::string_view id);
+/// Returns the unit of an effect's parameter; "" for a ratio and for what the catalogue does not hold.
+std::string effect_unit(std::string_view effect, std::string_view parameter);
 
 /// Names an effect and its size. `values` follow the parameters' order; a list takes as many places as it has values.
 struct Effect {

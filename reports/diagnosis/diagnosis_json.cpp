@@ -216,12 +216,12 @@ Json steps_json(const analysis::StepsBeforeFailure& s) {
           {"machine", machine}};
 }
 
-Json visibility_json(const analysis::Detectability& v) {
+Json visibility_json(const analysis::Diagnosis& d, const analysis::Detectability& v) {
   Json alike = Json::object();
   for (const auto& [effect, share] : v.alike) alike[effect] = number(share);
   return {{"effect", v.effect},
           {"parameter", v.parameter},
-          {"unit", effect_unit(v.effect, v.parameter)},
+          {"unit", unit_of(d, v.effect, v.parameter)},
           {"smallest", v.undecidable.empty() ? positive_or_null(v.smallest) : Json(nullptr)},
           {"alike", alike},
           {"undecidable", v.undecidable.empty() ? Json(nullptr) : Json(v.undecidable)}};
@@ -284,7 +284,7 @@ std::string diagnosis_json(const analysis::Diagnosis& d, const Provenance& prove
   json["shrinkage"] = shrinkage_json(d.shrinkage.measures.empty() ? unknown_shrinkage() : d.shrinkage.measures.front());
   json["shrinkage_by_measure"] = list_json(d.shrinkage.measures, shrinkage_json);
   json["steps_before_failure"] = steps_json(d.shrinkage.steps);
-  json["visibility"] = list_json(d.limits.visible, visibility_json);
+  json["visibility"] = list_json(d.limits.visible, [&](const auto& v) { return visibility_json(d, v); });
   json["missing_columns"] = list_json(d.limits.missing, missing_json);
   json["not_possible"] = list_json(d.limits.not_possible, [](const analysis::NotPossible& n) {
     return Json{

@@ -9,7 +9,6 @@
 #include "analysis/diagnosis/diagnosis_sentences.h"
 #include "analysis/statistics/falling_order.h"
 #include "analysis/statistics/interval_95.h"
-#include "dynamics/catalogue/effect_catalogue.h"
 #include "reports/output/known_cell.h"
 
 namespace metastable::reports {
@@ -70,12 +69,8 @@ std::string parameters_text(const Cause& cause) {
 
 }  // namespace
 
-std::string_view effect_unit(std::string_view effect, std::string_view parameter) {
-  for (const dynamics::EffectInfo& info : dynamics::effect_catalogue())
-    if (info.id == effect)
-      for (const dynamics::EffectParameter& p : info.parameters)
-        if (p.name == parameter) return p.unit;
-  return "";
+std::string unit_of(const Diagnosis& d, const std::string& effect, const std::string& parameter) {
+  return d.model ? d.model->unit_of(effect, parameter) : "";
 }
 
 // Adjusted p-values rise as statistics fall.
@@ -233,8 +228,8 @@ Table parameters_table(const Diagnosis& d) {
   for (const Cause& cause : d.causes.ranked)
     for (std::size_t e = 0; e < cause.parameters.size(); ++e)
       for (const EstimatedParameter& p : cause.parameters[e])
-        table.rows.push_back({cause.name(), cause.effects.at(e), p.name, with_interval(p),
-                              std::string(effect_unit(cause.effects.at(e), p.name))});
+        table.rows.push_back(
+            {cause.name(), cause.effects.at(e), p.name, with_interval(p), unit_of(d, cause.effects.at(e), p.name)});
   return table;
 }
 
@@ -279,7 +274,7 @@ Table steps_table(const Diagnosis& d) {
                           {.name = "with effect", .level = 90},
                           {.name = "this machine", .level = 90}}};
   const auto model = [](double value, const std::optional<Estimate>& interval) {
-    return value > 0 && interval ? Cell(Estimate{value, interval->lower, interval->upper}) : positive_cell(value);
+    return value > 0 && interval ? estimate_cell({value, interval->lower, interval->upper}) : positive_cell(value);
   };
   const auto own = [](const analysis::MachineSteps& machine) {
     return machine.at_least ? Cell(fmt::format("at least {} (95 %)", short_number(machine.steps.lower)))
@@ -291,7 +286,7 @@ Table steps_table(const Diagnosis& d) {
     return table;
   const auto here = std::ranges::find(s.machine, "", &analysis::MachineSteps::where);
   table.rows.push_back({"as measured",
-                        s.observed > 0 ? Cell(Estimate{s.observed, s.observed_lower, s.observed_upper}) : Cell(""),
+                        s.observed > 0 ? estimate_cell({s.observed, s.observed_lower, s.observed_upper}) : Cell(""),
                         positive_cell(s.baseline), model(s.recalibrated, s.recalibrated_90),
                         model(s.with_effect, s.with_effect_90), here == s.machine.end() ? Cell("") : own(*here)});
   for (const analysis::MachineSteps& machine : s.machine)
@@ -341,7 +336,7 @@ Table visibility_table(const Diagnosis& d) {
     for (const auto& [effect, share] : v.alike)
       alike += fmt::format("{}{} {:.0f} %", alike.empty() ? "" : ", ", effect, 100 * share);
     table.rows.push_back({v.effect, v.parameter, v.undecidable.empty() ? positive_cell(v.smallest) : Cell(""),
-                          std::string(effect_unit(v.effect, v.parameter)), alike, v.undecidable});
+                          unit_of(d, v.effect, v.parameter), alike, v.undecidable});
   }
   return table;
 }
@@ -359,8 +354,7 @@ Table missing_table(const Diagnosis& d) {
     if (m.effects.empty()) table.rows.push_back({m.column, "no effect is much harder to see", "", "", "", "", ""});
     for (const analysis::HiddenEffect& e : m.effects) {
       table.rows.push_back({m.column, e.effect, e.parameter, known_cell(e.smallest), known_cell(e.smallest_with_it),
-                            std::string(effect_unit(e.effect, e.parameter)),
-                            fmt::format("{}", fmt::join(e.not_told_from, ", "))});
+                            unit_of(d, e.effect, e.parameter), fmt::format("{}", fmt::join(e.not_told_from, ", "))});
     }
   }
   return table;

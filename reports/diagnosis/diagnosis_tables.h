@@ -1,7 +1,7 @@
 #pragma once
 // Makes the tables of a diagnosis.
 
-#include <string_view>
+#include <string>
 #include <vector>
 
 #include "analysis/diagnosis/diagnosis.h"
@@ -17,8 +17,8 @@ constexpr double where_level = 0.05;
 /// Lists the cells beyond chance, by rising adjusted p-value, then by falling statistic.
 std::vector<analysis::GapCell> beyond_chance(const analysis::GapMap& map);
 
-/// Returns the unit of an effect's parameter, "" for a ratio and for what the catalogue does not hold.
-std::string_view effect_unit(std::string_view effect, std::string_view parameter);
+/// Returns the unit of an effect's parameter, "" for a ratio and where the model is not known.
+std::string unit_of(const analysis::Diagnosis& diagnosis, const std::string& effect, const std::string& parameter);
 
 /// Says whether the answer is of speeds; else it is of the columns of a machine, whose model it then holds.
 bool of_speeds(const analysis::Diagnosis& diagnosis);

@@ -28,8 +28,8 @@ Table visibility_lines(const analysis::Diagnosis& d) {
       if (v.alike.size() > 1) remark += fmt::format(", and {} more", v.alike.size() - 1);
     }
     const bool seen = v.undecidable.empty() && std::isfinite(v.smallest) && v.smallest > 0;
-    table.rows.push_back({v.effect, v.parameter, seen ? Cell(v.smallest) : Cell(""),
-                          std::string(effect_unit(v.effect, v.parameter)), remark});
+    table.rows.push_back(
+        {v.effect, v.parameter, seen ? Cell(v.smallest) : Cell(""), unit_of(d, v.effect, v.parameter), remark});
   }
   return table;
 }

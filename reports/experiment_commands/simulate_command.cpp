@@ -7,7 +7,9 @@
 #include <stdexcept>
 #include <vector>
 
+#include "analysis/experiment/experiment.h"
 #include "analysis/experiment/experiment_folder.h"
+#include "analysis/experiment/input_error.h"
 #include "analysis/experiment/stand_in.h"
 #include "analysis/study/steady_launch.h"
 #include "reports/experiment_commands/experiment_output.h"
@@ -65,6 +67,18 @@ void require_end(const analysis::Setting& setting) {
     throw std::invalid_argument("--ramp-length: inf: the ramp of an experiment ends; up to 100000 m do");
 }
 
+// Refuses trials that no reader of experiment folders takes: on steep ramps wheels fly, and legs do not land in turn.
+void require_readable(const analysis::ExperimentSource& source) {
+  try {
+    analysis::parse_experiment(source);
+  } catch (const analysis::InputError& error) {
+    throw std::runtime_error(
+        fmt::format("nothing was written: an experiment folder holds wheels that roll from leg to "
+                    "leg, as these do not ({}): a flatter slope or slower launches do",
+                    error.lines().front()));
+  }
+}
+
 }  // namespace
 
 SimulatedExperiment simulated_experiment(const SimulateRequest& request, const BeginPart& begin) {
@@ -89,6 +103,7 @@ SimulatedExperiment simulated_experiment(const SimulateRequest& request, const B
     made.said.push_back(fmt::format("{} trials{}, {} of them came to rest", trials.size(),
                                     request.stand_in ? " of " + id : "", rested));
   }
+  require_readable(made.source);
   return made;
 }
 
@@ -118,6 +133,7 @@ SimulatedExperiment simulated_experiment(const LaboratoryRequest& asked, const B
   }
   made.said = {fmt::format("{} trials, {} of them came to rest; {} collisions, {} of them after a flight",
                            trials.size(), rested, collisions, flown)};
+  require_readable(made.source);
   return made;
 }
 

@@ -1,5 +1,5 @@
 // Works that run side by side ask a machine's map in joint calls, and get the answers that they would get alone.
-// Machines with bounds that hold no range, and steps that return NaN, are refused.
+// Machines with bounds that hold no range, and steps that return NaN, are refused. Units are read off names.
 
 #include "analysis/machine_model/machine.h"
 
@@ -13,8 +13,10 @@
 #include <span>
 #include <stdexcept>
 #include <string>
+#include <utility>
 #include <vector>
 
+#include "analysis/machine_model/machine_effects.h"
 #include "tests/message_of.h"
 
 namespace metastable::analysis::test {
@@ -151,6 +153,40 @@ TEST_F(MachineNames, OfEffectsAreTheirOwn) {
   EXPECT_EQ(refused(), "effects: \"no_gap\" is a name that answers give to no effect");
   machine.effects = {{"drag+friction", {{"c", 0, -0.5, 0.5}}}};
   EXPECT_EQ(refused(), "effects: \"drag+friction\": a name holds no +, which joins several effects");
+}
+
+TEST(Machine, UnitsAreThoseThatNamesEndIn) {
+  Machine machine;
+  machine.units = {{"damping", "N m s/rad"}};
+  for (const auto& [name, unit] : {std::pair("swing_rad_s", "rad/s"),
+                                   {"swing_rad", "rad"},
+                                   {"loss_n_m", "N m"},
+                                   {"per_rad", "1/rad"},
+                                   {"slope_deg", "deg"},
+                                   {"decay", ""},
+                                   {"gains", ""},
+                                   {"damping", "N m s/rad"}})
+    EXPECT_EQ(machine.unit_of(name), unit) << name;
+}
+
+TEST(MachineEffectUnit, IsThatOfWhatTheEffectChanges) {
+  Machine machine;
+  machine.states = {"swing_rad", "rate_rad_s"};
+  machine.parameters = {{"slope", 0.1, 0.1}, {"slope_deg", 3, 1}};
+  machine.may_vary = {"slope", "slope_deg"};
+  machine.effects = {{"drag", {{"per_rad", 0, 0, 1}}}};
+  const auto unit = [&](const char* effect, const char* parameter) {
+    return machine_effect_unit(machine, effect, parameter);
+  };
+  EXPECT_EQ(unit("drag", "per_rad"), "1/rad");
+  EXPECT_EQ(unit("slope_deg_by_phase", "change_in_1"), "deg");
+  EXPECT_EQ(unit("slope_drift", "change_over_the_runs"), "");
+  EXPECT_EQ(unit("slope_deg_with_rate_rad_s", "change_a_sd_of_the_state"), "deg");
+  EXPECT_EQ(unit("slope_deg_clock", "frequency_hz"), "Hz");
+  EXPECT_EQ(unit("slope_deg_stretch", "to_m"), "m");
+  EXPECT_EQ(unit("sensor_bias_rate_rad_s", "bias"), "rad/s");
+  EXPECT_EQ(unit("launch_spread_swing_rad", "sd_between_trials"), "rad");
+  EXPECT_EQ(unit("outliers", "share"), "");
 }
 
 }  // namespace

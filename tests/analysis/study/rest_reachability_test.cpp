@@ -6,7 +6,9 @@
 
 #include "analysis/study/metastability.h"
 #include "dynamics/return_map/trials.h"
+#include "markov/chain/chain.h"
 #include "tests/analysis/settings.h"
+#include "tests/message_of.h"
 
 namespace metastable::analysis {
 namespace {
@@ -78,6 +80,35 @@ TEST(RestReachability, SlowLaunchesOfAnEndlessWheelRest) {
   const double threshold = std::sqrt(*result.steps.safe_state);
   EXPECT_NEAR(*result.steps.reach_end, 0.5 * std::erfc((threshold - 3) / 0.1 / std::sqrt(2.0)), 2e-3);
   EXPECT_EQ(result.steps.distribution.quantile(0.5), 1.0);
+}
+
+// It rests out of a slow well, or leaps from there into one that it never leaves: either once in 300,000 steps.
+struct TwoWells {
+  std::pair<double, double> state_interval(int) const { return {0, 3}; }
+  int phases() const { return 1; }
+  int noise_dimension() const { return 1; }
+  std::optional<double> landing(double state, int, std::span<const double> score) const {
+    if (state < 1 && score[0] < -leap) return std::nullopt;
+    const double well = state < 1 && score[0] < leap ? 0.5 : 2.5;
+    return well + 0.4 * std::tanh(score[0]);
+  }
+  std::optional<std::pair<double, double>> landing_range(double state, int) const {
+    return std::pair{state < 1 ? markov::rest_landing : 2.1, 2.9};
+  }
+  double leap = 4.5;
+};
+
+// What is left of the launches after 100,000 steps is no number of those that never rest.
+TEST(RestReachability, LaunchesThatRestLateBesideOthersThatNeverDoHaveNoNumber) {
+  const auto from_slow = [](double leap) {
+    const Problem problem{TwoWells{leap}, {[](double) { return 0.5; }, 0}};
+    return study(problem, {.cells = 128, .samples = 4096});
+  };
+  EXPECT_NE(message_of<markov::ConvergenceError>([&] {
+              from_slow(4.5);
+            }).find("launches still come to rest after 100000 steps, beside others that never do"),
+            std::string::npos);
+  EXPECT_EQ(from_slow(2).status, Status::rest_unreachable);
 }
 
 // The wheel could roll for ever, but no launch gets that far: once "infinite", or no answer at all.

@@ -33,6 +33,21 @@ TEST_F(SimulateCommand, LaunchesAreSteadyWhereThePaperHasNone) {
       << read(path("t/experiment.toml"));
 }
 
+// On 18 deg a rigid wheel takes off: such trials are none of an experiment folder, which the reader would refuse.
+TEST_F(SimulateCommand, WheelsThatFlyOverALegAreNotWritten) {
+  for (const bool reality : {false, true}) {
+    std::vector<std::string> words{"simulate", "--law",    "settled", "--slope", "18",     "--initial-speed",
+                                   "8,0.5",    "--trials", "20",      "--out",   path("t")};
+    if (reality) words.emplace_back("--reality");
+    const Ran ran = metastable(words);
+    EXPECT_EQ(ran.code, 3);
+    EXPECT_NE(ran.err.find("nothing was written: an experiment folder holds wheels that roll from leg to leg"),
+              std::string::npos)
+        << ran.err;
+    EXPECT_FALSE(std::filesystem::exists(folder_ / "t"));
+  }
+}
+
 // What it understands gives the same trials on one thread and on two.
 TEST_F(SimulateCommand, RealityLeavesNothingBehindWhenItIsMisunderstood) {
   const auto refused = [&](std::vector<std::string> words) {
