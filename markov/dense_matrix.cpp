@@ -15,6 +15,7 @@ Eigen::MatrixXd solve_columns(const Eigen::MatrixXd& matrix, const Eigen::Matrix
 }
 
 SymmetricEigen symmetric_eigen(const Eigen::MatrixXd& matrix) {
+  if (matrix.rows() == 0) return {};  // Eigen's solver reads its first entry.
   const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> solver(matrix);
   return {solver.eigenvalues(), solver.eigenvectors()};
 }

@@ -9,7 +9,7 @@
 namespace metastable::markov {
 
 /// Solves systems with one symmetric matrix by its LDL^T factors. Semidefinite ones give some solution.
-/// @param matrix  [n x n], n >= 1, of which the lower triangle is read
+/// @param matrix  [n x n], of which the lower triangle is read
 /// @param right  [n]
 Eigen::VectorXd solve_symmetric(const Eigen::MatrixXd& matrix, const Eigen::VectorXd& right);
 /// Does it for every column of `right` [n x k].

@@ -24,6 +24,12 @@ double at_zero(const std::vector<double>& by_size, std::size_t first, std::size_
 
 }  // namespace
 
+MeshEstimate estimate_of(const Extrapolated& logarithm) {
+  const double value = std::exp(logarithm.value);
+  const double factor = std::exp(std::hypot(logarithm.shift_error, logarithm.discretization_error));
+  return {value, value / factor, value * factor};
+}
+
 Extrapolated extrapolate_sizes(std::span<const std::vector<double>> values) {
   const auto n = static_cast<double>(values.size());
   const std::size_t sizes = values.front().size();

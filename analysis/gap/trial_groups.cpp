@@ -20,12 +20,14 @@ namespace metastable::analysis {
 namespace {
 
 constexpr std::size_t fewest_in_group = 3;
-constexpr double least_share = 0.1;    // of the trials, in the smaller group
-constexpr int split_draws = 2000;      // for the chance level of one split
-constexpr int counted_draws = 60;      // beyond which its tail follows an exponential law
-constexpr double poor_share = 0.1;     // of the usual information of a step: a trial says next to nothing
-constexpr double most_poor = 0.1;      // share of the trials that may say so little
-constexpr double one_sided = 0.8;      // of all scores along what changes their spread, not their mean
+constexpr double least_share = 0.1;  // of the trials, in the smaller group
+constexpr int split_draws = 2000;    // for the chance level of one split
+constexpr int counted_draws = 60;    // beyond which its tail follows an exponential law
+constexpr double poor_share = 0.1;   // of the usual information of a step: a trial says next to nothing
+constexpr double most_poor = 0.1;    // share of the steps that trials may hold which say so little
+// What changes the spread of scores moves each of them away from 0 or towards it: of all moves, so large a share goes
+// one way. What changes their mean moves those of one machine of two both ways, and it holds a tenth of the trials.
+constexpr double one_sided = 0.95;
 constexpr double least_apart = 3;      // sds of a trial: groups that overlap more are none
 constexpr std::size_t most_named = 5;  // trials in the sentence
 constexpr double least_weight = 1e-12;
@@ -74,32 +76,36 @@ Direction direction(std::string name, const Derivatives& columns, Eigen::Index p
 }
 
 // Returns [trials] what the scores say of a parameter by itself, in the trials whose steps tell of it; nothing where
-// many trials do not, as of what depends on their order, and of what changes the spread of scores. Steps weigh alike:
-// trials far off the model have another information, and few of them must not stand for all. Where the change of a
-// score depends on what was observed, change times score is not 0 in the mean, but what the stretch is: without it,
-// trials that differ by their design alone, as slow stretches of a run do from fast ones, would lie apart.
+// trials with many of the steps do not, as of what depends on their order, and of what changes the spread of scores.
+// Steps weigh alike: trials far off the model have another information, and few of them must not stand for all. Where
+// the change of a score depends on what was observed, change times score is not 0 in the mean, but what the stretch is:
+// without it, trials that differ by their design alone, as slow stretches of a run do from fast ones, would lie apart.
 std::vector<TrialValue> trial_values(const TransitionModel& model, const Direction& direction,
                                      const std::vector<double>& score) {
   std::vector<double> along(model.trials()), weight(model.trials()), events(model.trials());
-  double sum = 0, sizes = 0;
+  double outwards = 0, sizes = 0;
   for (std::size_t e = 0; e < model.events().size(); ++e) {
     const Event& event = model.events()[e];
     if (event.kind == EventKind::launch) continue;
     const bool outcome = event.kind == EventKind::rest || event.kind == EventKind::survival;  // which has no speed
     const double c = direction.change[static_cast<Eigen::Index>(e)];
     along[event.trial] += c * score[e] - (outcome ? 0 : direction.stretch[static_cast<Eigen::Index>(e)]);
-    sum += c * score[e];
-    sizes += std::abs(c * score[e]);
+    outwards += score[e] < 0 ? -c : c;
+    sizes += std::abs(c);
     weight[event.trial] += c * c;
     ++events[event.trial];
   }
   std::vector<double> rates;
   for (std::size_t t = 0; t < weight.size(); ++t)
     if (events[t] > 0) rates.push_back(weight[t] / events[t]);
-  if (rates.empty() || std::abs(sum) > one_sided * sizes) return {};
+  if (rates.empty() || std::abs(outwards) > one_sided * sizes) return {};
   const double usual = median(rates);
-  const auto poor = std::ranges::count_if(rates, [&](double rate) { return !(rate > poor_share * usual); });
-  if (!(usual > least_weight) || static_cast<double>(poor) > most_poor * static_cast<double>(rates.size())) return {};
+  double poor = 0, all = 0;
+  for (std::size_t t = 0; t < weight.size(); ++t) {
+    all += events[t];
+    if (!(weight[t] > poor_share * usual * events[t])) poor += events[t];
+  }
+  if (!(usual > least_weight) || poor > most_poor * all) return {};
   std::vector<TrialValue> values;
   for (std::size_t t = 0; t < weight.size(); ++t)
     if (events[t] > 0 && weight[t] > poor_share * usual * events[t])

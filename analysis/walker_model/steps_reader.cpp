@@ -49,6 +49,7 @@ class StepsReader {
       if (!csv.has(c))
         defects_.add(file, {1, 1}, fmt::format("there is no column {}, which {}", all[c].name, who_names(c - state_)));
     if (columns_.legs && csv.has(phase_)) runs_.phases = {"1", "2"};
+    names_both_legs_ = columns_.legs && csv.has(phase_) && names_both_legs(all);
     while (csv.next()) read_row(csv);
     if (runs_.trials.empty() && defects_.empty()) defects_.add(file, {}, "holds no step");
     if (source_.trials_csv) read_outcomes();
@@ -79,6 +80,18 @@ class StepsReader {
     if (column >= inputs + columns_.labels.size()) return "labels names";
     if (column >= inputs || columns_.legs) return "experiment.toml states";
     return column < states ? "the machine observes" : "the machine takes";
+  }
+
+  // Says whether leg 1 stands in a row and leg 2 in another one; it reads the file until that is known.
+  bool names_both_legs(const std::vector<CsvColumn>& all) const {
+    Defects ignored;
+    CsvReader csv("", *source_.steps_csv, all, ignored);
+    std::set<std::int64_t> named;
+    while (named.size() < 2 && csv.next()) {
+      std::optional<std::int64_t> phase;
+      if (csv.read(phase_, 1, 2, phase) && phase) named.insert(*phase);
+    }
+    return named.size() == 2;
   }
 
   static std::string condition_of(const CsvReader& csv) {
@@ -138,9 +151,20 @@ class StepsReader {
     std::vector<MachineRow>& rows = runs_.trials.back().rows;
     if (step != static_cast<std::int64_t>(rows.size()) + 1)
       return csv.refuse(step_, fmt::format("{} is not due: step {} of trial {} is", step, rows.size() + 1, key.second));
+    if (names_both_legs_ && row.phase >= 0) require_other_leg(csv, rows, row.phase);
     if (!rows.empty() && row.time <= rows.back().time)
       return csv.refuse(time_, fmt::format("{} does not come after {} of the step before", row.time, rows.back().time));
     rows.push_back(std::move(row));
+  }
+
+  // Refuses a leg that does not take turns with the one that the last row with a leg tells.
+  static void require_other_leg(CsvReader& csv, const std::vector<MachineRow>& rows, int phase) {
+    const auto last = std::find_if(rows.rbegin(), rows.rend(), [](const MachineRow& row) { return row.phase >= 0; });
+    if (last == rows.rend()) return;
+    const auto apart = last - rows.rbegin() + 1;
+    if ((last->phase + apart) % 2 == phase) return;
+    csv.refuse(phase_, fmt::format("leg {} does not stand {}after leg {}: a row is missing, or out of order", phase + 1,
+                                   apart == 1 ? "" : fmt::format("{} rows ", apart), last->phase + 1));
   }
 
   void read_outcomes() {
@@ -177,6 +201,7 @@ class StepsReader {
   Defects& defects_;
   std::map<Key, std::size_t> trials_;
   Key last_;
+  bool names_both_legs_ = false;
 };
 
 }  // namespace

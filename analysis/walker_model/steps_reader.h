@@ -17,7 +17,7 @@ struct StepColumns {
   std::vector<std::pair<std::string, dynamics::Range>> states;  ///< measured, each with the range of its values
   /// Labels are those that experiment.toml lists; behind them come others that the call names.
   std::vector<std::string> labels = {}, labels_of_call = {}, inputs = {};
-  bool legs = false;          ///< phases are legs, 1 and 2; else any words
+  bool legs = false;          ///< phases are legs, 1 and 2, which take turns where both are named; else any words
   bool leg_is_input = false;  ///< the leg is an input of the step
 };
 
@@ -25,9 +25,9 @@ struct StepColumns {
 /// nothing.
 std::string label_objection(const std::vector<std::string>& labels, const StepColumns& columns);
 
-/// Checks names and types of the columns, steps of a trial in order without gap, trials that stand together, and
-/// outcomes of those trials only. Values of labels and phases have the order in which they come. What is wrong goes to
-/// `defects`, each with file, line and column.
+/// Checks names and types of the columns, steps of a trial in order without gap, legs that take turns, trials that
+/// stand together, and outcomes of those trials only. Values of labels and phases have the order in which they come.
+/// What is wrong goes to `defects`, each with file, line and column.
 /// @param source  with the texts of both files; trials.csv may be missing
 void read_steps(const ExperimentSource& source, const StepColumns& columns, MachineRuns& runs, Defects& defects);
 

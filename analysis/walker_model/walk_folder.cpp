@@ -47,6 +47,32 @@ void require_walker(const WalkDescription& told, const std::string& folder) {
                       "simulator of your own from Python, as metastable.machine() and metastable.runs()"});
 }
 
+// Returns the state just after a strike in the gait of the stated walker.
+std::vector<double> gait_of(const WalkerSetting& setting) {
+  return gait_state(setting, dynamics::find_gait(setting.map().walker(), setting.slope_deg * degree));
+}
+
+// Builds the model of the walks. Where the stated walker fails from most rows, it says what to check of the columns:
+// score_plan() knows the machine, but not what its columns mean.
+std::unique_ptr<TransitionModel> transitions_of(const Walks& walks) {
+  try {
+    return machine_transitions(walks.machine, walks.runs);
+  } catch (const std::invalid_argument& error) {
+    const std::string said = error.what();
+    if (!said.starts_with("step: fails without noise")) throw;
+    const Machine& machine = *walks.machine;
+    const std::vector<double> gait = gait_of({walker_from_name(machine.name), machine.parameters[0].nominal,
+                                              machine.parameters[1].nominal, dynamics::Terrain::fresh});
+    std::string there;
+    for (std::size_t s = 0; s < gait.size(); ++s)
+      there += fmt::format("{}{} is {:.3g}", s == 0 ? "" : ", ", machine.states[s], gait[s]);
+    throw std::invalid_argument(
+        fmt::format("{}: in the gait of this model {}; check that angles are in radians, that half_angle_rad is half "
+                    "the angle between the legs, and the signs of the rates",
+                    said, there));
+  }
+}
+
 // How walks that are drawn begin beside the gait, by state.
 struct DrawnLaunch {
   std::vector<double> offset, scatter;
@@ -220,9 +246,7 @@ std::optional<Walks> parse_walks(const ExperimentSource& source) {
   for (const WalkDescription::Column& column : told->columns)
     machine->observe.push_back({column.state, column.sd, column.correlation});
   // Without a launch that is stated, a value that a trial's first row lacks is around the gait's.
-  const dynamics::TwoLinkWalker walker = statement.setting.map().walker();
-  const std::vector<double> gait =
-      gait_state(statement.setting, dynamics::find_gait(walker, statement.setting.slope_deg * degree));
+  const std::vector<double> gait = gait_of(statement.setting);
   for (std::size_t s = 0; s < machine->states.size(); ++s) {
     const auto stated = std::ranges::find(told->launches, machine->states[s], &std::pair<std::string, Spread>::first);
     if (stated != told->launches.end())
@@ -245,7 +269,7 @@ std::optional<Walks> parse_walks(const ExperimentSource& source) {
 
 Diagnosis diagnose_walks(const Walks& walks, const DiagnosisOptions& options) {
   if (!options.elsewhere.empty()) throw std::invalid_argument("--at-slope, --at-speed: have no meaning with walks");
-  std::shared_ptr<const TransitionModel> model = machine_transitions(walks.machine, walks.runs);
+  std::shared_ptr<const TransitionModel> model = transitions_of(walks);
   require_effects(options.catalogue, model->effect_ids());
   Diagnosis answer = diagnose(std::move(model), options);
   for (StepwiseChoice& choice : least_squares_selection(*walks.machine, walks.runs, options.catalogue))
@@ -331,8 +355,7 @@ WalkFiles draw_walks(const WalkerSetting& setting, std::vector<std::pair<std::st
   const WalkerStatement statement = drawn_walker(setting);
   const Machine machine = walker_machine(statement);
   const double rate_error = statement.legs ? compass_rate_error : simplest_rate_error;
-  const std::vector<double> start =
-      gait_state(setting, dynamics::find_gait(setting.map().walker(), setting.slope_deg * degree));
+  const std::vector<double> start = gait_of(setting);
   WalkStatement told{title, statement, {}};
   WalkFiles files;
   files.steps_csv = "trial,step,phase";

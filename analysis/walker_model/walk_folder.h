@@ -31,16 +31,17 @@ bool holds_walks(const std::filesystem::path& folder);
 bool states_walks(const std::string& experiment_toml);
 
 /// Reads a folder whose experiment.toml states `system = "machine"`; nothing where it states another.
-/// Checks names, types and ranges of keys and columns, steps of a trial in order without gap, trials that stand
-/// together, and outcomes of those trials only.
+/// Checks names, types and ranges of keys and columns, steps of a trial in order without gap, legs that take turns,
+/// trials that stand together, and outcomes of those trials only.
 /// @throws InputError with the first 20 defects, each with file, line and column; with one alone where the model of the
 /// walker is missing or unknown, or where collisions.csv is there, too
 std::optional<Walks> read_walks(const std::filesystem::path& folder);
 /// Reads it from the texts of its files.
 std::optional<Walks> parse_walks(const ExperimentSource& source);
 
-/// @throws as machine_transitions() and diagnose(); std::invalid_argument for another slope or speed, which
-///   walks do not have, and for an effect of the catalogue that this machine does not know
+/// @throws as machine_transitions() and diagnose(), with what to check of the columns where the walker fails from most
+///   rows; std::invalid_argument for another slope or speed, which walks do not have, and for an effect of the
+///   catalogue that this machine does not know
 Diagnosis diagnose_walks(const Walks& walks, const DiagnosisOptions& options);
 
 /// Holds the three files as text.

@@ -25,7 +25,44 @@ double ForetoldHazard::at(std::uint64_t steps) const {
     hazard = known > 0 ? -std::log(survival.back()) : 0;
     hazard -= (number - static_cast<double>(known)) * std::log1p(-std::min(rate, 1.0));
   }
-  return scale * hazard;
+  return hazard;
+}
+
+std::vector<MeshEstimate> extrapolated_survival(
+    const std::vector<std::vector<ForetoldHazard>>& hazards, double leaving,
+    const std::function<Extrapolated(const std::vector<std::vector<double>>&)>& extrapolate) {
+  const std::vector<double>& finest = hazards.front().back().survival;
+  std::vector<MeshEstimate> survival;
+  std::vector<std::vector<double>> logs(hazards.size(), std::vector<double>(hazards.front().size()));
+  for (std::size_t k = 0; k < finest.size(); ++k) {
+    bool seen = true;
+    for (std::size_t shift = 0; shift < hazards.size(); ++shift)
+      for (std::size_t size = 0; size < hazards[shift].size(); ++size) {
+        logs[shift][size] = std::log(hazards[shift][size].at(k + 1));
+        seen = seen && std::isfinite(logs[shift][size]);
+      }
+    MeshEstimate share{finest[k], finest[k], finest[k]};
+    if (seen) {
+      const MeshEstimate hazard = estimate_of(extrapolate(logs));
+      share = {std::exp(-hazard.value), std::exp(-hazard.upper * std::exp(leaving)), std::exp(-hazard.lower)};
+    }
+    // Extrapolated shares fall like those of a mesh.
+    if (k > 0)
+      for (double MeshEstimate::*end : {&MeshEstimate::value, &MeshEstimate::lower, &MeshEstimate::upper})
+        share.*end = std::min(share.*end, survival.back().*end);
+    survival.push_back(share);
+  }
+  return survival;
+}
+
+MeshEstimate survival_after(std::span<const MeshEstimate> survival, const MeshEstimate& rate, std::uint64_t steps) {
+  const std::size_t known = std::min<std::size_t>(steps, survival.size());
+  const MeshEstimate head = known > 0 ? survival[known - 1] : MeshEstimate{1, 1, 1};
+  const auto beyond = static_cast<double>(steps - known);
+  const auto on = [beyond](double share, double failing) {
+    return share * std::exp(beyond * std::log1p(-std::min(failing, 1.0)));
+  };
+  return {on(head.value, rate.value), on(head.lower, rate.upper), on(head.upper, rate.lower)};
 }
 
 bool FailureCount::refutes(const ForetoldHazard& hazard) const {

@@ -3,8 +3,12 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <functional>
+#include <span>
 #include <string>
 #include <vector>
+
+#include "markov/size_extrapolation.h"
 
 namespace metastable::markov {
 
@@ -17,11 +21,22 @@ inline constexpr double refutation_level = 1e-3;
 struct ForetoldHazard {
   std::vector<double> survival;  ///< [k]: share that walks on after k + 1 steps; beyond the last at `rate` a step
   double rate = 0;               ///< chance of failing in a step, once settled
-  double scale = 1;              ///< of H: the mesh's expected steps over the extrapolated ones
   double fewer = 0, more = 0;    ///< logarithms: how many times fewer and more steps their 95 % interval allows
 
   double at(std::uint64_t steps) const;
 };
+
+/// Brings what meshes of several sizes and shifts foretell to the spacing zero, step by step: by ln H, as `extrapolate`
+/// does it with [shift][size]. Where a mesh sees no failure yet, or nobody walks on, it is what the finest one says.
+/// @param hazards  [shift][size], at least one
+/// @param leaving  the logarithm by which what leaves the meshes may raise H
+std::vector<MeshEstimate> extrapolated_survival(
+    const std::vector<std::vector<ForetoldHazard>>& hazards, double leaving,
+    const std::function<Extrapolated(const std::vector<std::vector<double>>&)>& extrapolate);
+
+/// Returns the share that walks on after so many steps.
+/// @param survival  after 1, 2, ... steps @param rate  chance of failing in each step beyond
+MeshEstimate survival_after(std::span<const MeshEstimate> survival, const MeshEstimate& rate, std::uint64_t steps);
 
 /// Holds walks of which each failed within so many steps or walked on. Whatever happens in a walk, walks are
 /// independent: their number of failures is binomial, also where failures come in clusters or very late.

@@ -63,12 +63,6 @@ double coarsest_spacing(const BatchMap& map, const MeshStudyOptions& options) {
 
 double half_width(const MeshEstimate& e) { return 0.5 * std::log(e.upper / e.lower); }
 
-MeshEstimate around(const Extrapolated& logarithm) {
-  const double value = std::exp(logarithm.value);
-  const double factor = std::exp(std::hypot(logarithm.shift_error, logarithm.discretization_error));
-  return {value, value / factor, value * factor};
-}
-
 /// Returns the simulations of a study: of about `simulated_steps` steps.
 SimulationOptions walking(const MeshStudyOptions& options) {
   return {.seed = options.seed, .threads = options.threads, .most_steps = options.simulated_steps};
@@ -91,7 +85,8 @@ class Run {
         at_once_(map.dear ? 1 : std::min(thread_count(options.threads), options.shifts)),
         steps_(most_shifts_, std::vector<double>(sizes_)),
         rates_(steps_),
-        brackets_(steps_) {
+        brackets_(steps_),
+        hazards_(most_shifts_, std::vector<ForetoldHazard>(sizes_)) {
     study_.sizes.resize(sizes_);
     study_.orbit = std::move(around.orbit);
     study_.period = around.period;
@@ -302,6 +297,7 @@ class Run {
       coarsest_.seconds += work_.seconds() - before;
       study_.blind_spots = find_blind_spots(map_, frames_, mesh, passage.visits, mesh_options(0, 0));
     }
+    hazards_[shift][size] = {std::move(passage.survival), coupled.first_rate};
     const std::lock_guard lock(mutex_);
     if (size == 0 && shift == 0) coarse_mixing_ = passage.mixing_steps;
     if (guides(size, shift)) guide_settled_ = std::move(passage.distribution);
@@ -309,8 +305,6 @@ class Run {
     study_.sizes[size] = {mesh_options(size, 0).spacing, mesh.size(), mesh.entries(), {}};
     if (size + 1 < sizes_) return mesh.bytes();
     study_.mixing_steps = passage.mixing_steps;
-    study_.survival = std::move(passage.survival);
-    tail_rate_ = coupled.first_rate;
     if (several_gaits()) {
       study_.gait_share = std::move(coupled.share);
       study_.gait_failures = failures_by_gait(mesh, start_, passage.visits, study_.gaits.orbits, frames_);
@@ -344,7 +338,7 @@ class Run {
       study_.bracket = std::max(study_.bracket, std::ranges::max(brackets_[shift]));
     // What an extrapolation says of its own error grows with what it left out: as the square of the spacing.
     const double coarser = std::max(1.0, study_.sizes.front().spacing / coarsest(map_.dimension));
-    const auto extrapolated = [&](const std::vector<std::vector<double>>& logs) {
+    const auto extrapolated = [this, coarser](const std::vector<std::vector<double>>& logs) {
       Extrapolated e = extrapolate_sizes(std::span(logs).first(shifts_));
       e.discretization_error = std::hypot(coarser * coarser * e.discretization_error, row_error);
       return e;
@@ -354,10 +348,12 @@ class Run {
                                by_rate.shift_error / (by_rate.discretization_error + study_.bracket));
     study_.shift_error = by_steps.shift_error;
     study_.discretization_error = by_steps.discretization_error;
-    study_.steps = around(by_steps);
+    study_.steps = estimate_of(by_steps);
     study_.steps.lower *= std::exp(-study_.bracket);
-    study_.failure_rate = around(by_rate);
+    study_.failure_rate = estimate_of(by_rate);
     study_.failure_rate.upper *= std::exp(study_.bracket);
+    study_.survival = extrapolated_survival({hazards_.begin(), hazards_.begin() + static_cast<std::ptrdiff_t>(shifts_)},
+                                            study_.bracket, extrapolated);
   }
 
   /// Widens the intervals by what the mesh may not have seen, or says that it is too much.
@@ -375,10 +371,17 @@ class Run {
     study_.steps.upper *= 1 + blind.imagined;
     study_.failure_rate.upper *= 1 + blind.missed;
     study_.failure_rate.lower /= 1 + blind.imagined;
+    for (MeshEstimate& share : study_.survival) {
+      share.lower = std::pow(share.lower, 1 + blind.missed);
+      share.upper = std::pow(share.upper, 1 / (1 + blind.imagined));
+    }
   }
 
   ForetoldHazard hazard() const {
-    return {study_.survival, tail_rate_, std::exp(steps_[0][sizes_ - 1]) / study_.steps.value,
+    std::vector<double> survival;
+    for (const MeshEstimate& share : study_.survival) survival.push_back(share.value);
+    const double scale = std::exp(steps_[0][sizes_ - 1]) / study_.steps.value;
+    return {std::move(survival), scale * hazards_[0][sizes_ - 1].rate,
             std::log(study_.steps.value / study_.steps.lower), std::log(study_.steps.upper / study_.steps.value)};
   }
 
@@ -511,8 +514,8 @@ class Run {
   double shifts_scatter_ = 0;                     ///< t-interval over what else the interval holds
   int at_once_;                                   ///< meshes
   std::vector<std::vector<double>> steps_, rates_, brackets_;  ///< logs, [shift][size]
+  std::vector<std::vector<ForetoldHazard>> hazards_;           ///< [shift][size], with the rate beyond
   MeshStudy study_;
-  double tail_rate_ = 0;  ///< a step, beyond the survival of the study
   double coarse_mixing_ = 0;
   Spent coarsest_, searched_;          ///< on the coarsest mesh, on the search for other gaits
   std::unique_ptr<Mesh> guide_;        ///< of guided sampling
@@ -546,11 +549,6 @@ MeshStudy study_around(const BatchMap& map, std::span<const double> start, const
 }
 
 }  // namespace
-
-MeshEstimate steps_from_quasi_stationary(const MeshStudy& study) {
-  const MeshEstimate& rate = study.failure_rate;
-  return {1 / rate.value, 1 / rate.upper, 1 / rate.lower};
-}
 
 double study_score_spacing(const BatchMap& map) {
   // The curve of one score takes further places where it needs them. Intervals of one dimension are the narrowest.

@@ -17,6 +17,7 @@
 #include "markov/mesh/mesh.h"
 #include "markov/mesh/noise_frame.h"
 #include "markov/mesh/other_gaits.h"
+#include "markov/size_extrapolation.h"
 
 namespace metastable::markov {
 
@@ -36,11 +37,6 @@ struct MeshStudyOptions {
   std::function<void(double)> progress = {};
 };
 
-/// Holds a number with its 95 % interval.
-struct MeshEstimate {
-  double value = 0, lower = 0, upper = 0;
-};
-
 struct MeshSize {
   double spacing = 0;
   std::size_t nodes = 0, entries = 0;  ///< of the first shift
@@ -51,7 +47,8 @@ struct MeshStudy {
   MeshEstimate steps;         ///< expected steps before failure from the start
   MeshEstimate failure_rate;  ///< a step, from the quasi-stationary distribution
   double mixing_steps = 0;
-  std::vector<double> survival;  ///< as MeshPassage's, of the finest mesh's first shift
+  /// Holds the shares that walk on after 1, 2, ... steps, until they fall by the failure rate: see survival_after().
+  std::vector<MeshEstimate> survival;
   double cheapest_failure = 0;
   NoiseFreeOrbit orbit;  ///< of a gait that comes back after several revolutions, over all of them
   int period = 1;        ///< revolutions after which the gait comes back; 0: there is none, `orbit` has no eigenvalues
@@ -83,7 +80,15 @@ struct MeshStudy {
 };
 
 /// Returns the expected steps of survivors who have forgotten the start: one over the failure rate.
-MeshEstimate steps_from_quasi_stationary(const MeshStudy& study);
+inline MeshEstimate steps_from_quasi_stationary(const MeshStudy& study) {
+  const MeshEstimate& rate = study.failure_rate;
+  return {1 / rate.value, 1 / rate.upper, 1 / rate.lower};
+}
+
+/// Returns the share that walks on after so many steps.
+inline MeshEstimate survival_after(const MeshStudy& study, std::uint64_t steps) {
+  return survival_after(study.survival, study.failure_rate, steps);
+}
 
 /// Returns the spacing of the scores that a study's meshes take.
 double study_score_spacing(const BatchMap& map);
@@ -119,8 +124,9 @@ class RefutedMesh : public Disagreement {
 /// The interval joins, as a root of squares, the t-interval over the shifts and the discretization error; Walkers
 /// that leave the mesh count as survivors, and at the lower end of the interval as failed; what blind spots may hold is
 /// added on its side. The discretization error is the difference from the extrapolation without the coarsest
-/// size; with four sizes, at least that between the two triples'. Meshes coarser than the default count it by the
-/// square of the ratio of their spacings: the sizes show less and less of it.
+/// size; with four sizes, at least that between the two triples'. Shares that walk on are extrapolated like the steps,
+/// by the logarithm of the hazard -ln S. Meshes coarser than the default count it by the square of the ratio of their
+/// spacings: the sizes show less and less of it.
 ///
 /// Beside it stand importance sampling guided by the second coarsest mesh, where T is above 100 steps and above three
 /// windows of it and fewer than 4000 trials fit into `simulated_steps`, and direct simulation: trials to failure where

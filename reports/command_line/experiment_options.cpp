@@ -208,12 +208,24 @@ Command study() {
           {"metastable study", "metastable study --data stand-in --out measured"}};
 }
 
+// Runs the diagnosis, which knows options by their keys: what it refuses of a key is said of the option.
+void diagnose_as_asked(const Options& o, const std::string& line) {
+  try {
+    run_diagnose(diagnose_request(o, line));
+  } catch (const std::invalid_argument& error) {
+    const std::string said = error.what();
+    for (const char* key : {"catalogue", analysis::other_slope, analysis::other_launch})
+      if (said.starts_with(fmt::format("{}: ", key))) throw std::invalid_argument("--" + said);
+    throw;
+  }
+}
+
 Command diagnose() {
   return {
       "diagnose",
       "The gap between an experiment and its nominal model: where it lies, which effect closes it, how far",
       declare_diagnose,
-      [](const Options& o, const std::string& line) { run_diagnose(diagnose_request(o, line)); },
+      diagnose_as_asked,
       "",
       {"metastable simulate --reality --slope 9.59 --out wheel \\\n    --effect leg_contact:leg=3,friction_ratio=1.4",
        "metastable diagnose wheel", "metastable diagnose wheel --out diagnosis"}};

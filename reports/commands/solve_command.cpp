@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <mutex>
 #include <nlohmann/json.hpp>
 #include <stdexcept>
@@ -57,14 +58,6 @@ class Looking {
   double all_, looked_at_ = 0;
 };
 
-// Returns P(steps > n): as the mesh has it, and with the failure rate beyond.
-double walker_survival(const markov::MeshStudy& passage, int n) {
-  const std::vector<double>& head = passage.survival;
-  const auto known = std::min(static_cast<std::size_t>(n), head.size() - 1);
-  return head[known] *
-         std::exp(static_cast<double>(static_cast<std::size_t>(n) - known) * std::log1p(-passage.failure_rate.value));
-}
-
 Answered walker_answer(const SolveRequest& request, const analysis::WalkerSetting& setting, int threads,
                        Looking& looking) {
   markov::MeshStudyOptions meshes = request.meshes;
@@ -74,7 +67,9 @@ Answered walker_answer(const SolveRequest& request, const analysis::WalkerSettin
         agreed_walker(setting, meshes, [&](double, const std::string&) { looking.still(); }).passage;
     const analysis::Estimate steps{passage.steps.value, passage.steps.lower, passage.steps.upper};
     if (request.target.of == Target::Of::steps) return {steps, ""};
-    return {analysis::probability(walker_survival(passage, request.target.steps), steps), ""};
+    const markov::MeshEstimate share =
+        markov::survival_after(passage, static_cast<std::uint64_t>(request.target.steps));
+    return {{share.value, share.lower, share.upper}, ""};
   } catch (const Interrupted&) {
     throw;
   } catch (const std::runtime_error& error) {  // no gait that is stable, or ways that disagree
@@ -92,12 +87,15 @@ analysis::SolveRange walker_range(const SolveRequest& request) {
                              : analysis::SolveRange{0.2 * slope, 1.6 * slope, false};
 }
 
+// Returns the walker with a value of what is solved for.
+analysis::WalkerSetting walker_with(const SolveRequest& request, double value) {
+  analysis::WalkerSetting setting = *request.walker;
+  (request.of_slope_sd ? setting.slope_sd_deg : setting.slope_deg) = value;
+  return setting;
+}
+
 Solution solve_walker(const SolveRequest& request, const analysis::SolveOptions& options, Looking& looking) {
-  const auto with = [&](double value) {
-    analysis::WalkerSetting setting = *request.walker;
-    (request.of_slope_sd ? setting.slope_sd_deg : setting.slope_deg) = value;
-    return setting;
-  };
+  const auto with = [&](double value) { return walker_with(request, value); };
   const analysis::SolveRange range = walker_range(request);
   for (const double end : {options.from.value_or(range.from), options.to.value_or(range.to)}) with(end).map();
   Solution solution =
@@ -110,8 +108,11 @@ Solution solve_walker(const SolveRequest& request, const analysis::SolveOptions&
 
 // Returns the line that says what everything but the parameter is.
 std::string described(const SolveRequest& request) {
-  if (request.walker) return request.walker->describe();
-  return analysis::sweep_description(request.setting, {{request.parameter, {0, 1}}});
+  if (!request.walker) return analysis::sweep_description(request.setting, {{request.parameter, {0, 1}}});
+  // The number that is solved for is none: it is described as "nan deg".
+  constexpr std::string_view none = "nan deg";
+  std::string text = walker_with(request, std::numeric_limits<double>::quiet_NaN()).describe();
+  return text.replace(text.find(none), none.size(), "varies");
 }
 
 SolveJson solve_number(double value) {

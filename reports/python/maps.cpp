@@ -27,20 +27,14 @@
 namespace metastable::reports::python {
 namespace {
 
-py::array survival_array(const std::vector<double>& shares) {
-  std::vector<double> survival{1};
-  survival.insert(survival.end(), shares.begin(), shares.end());
-  return array_of(std::move(survival));
-}
-
-// Says how long something walks by splitting: shares that walk on, and the ends of their intervals, NaN where unknown.
-void tell_survival(const markov::SplittingStudy& study, py::dict& arrays) {
-  std::vector<double> shares, ends{1, 1};
-  for (const markov::MeshEstimate& one : study.survival)
+// Says how long something walks: shares that walk on, and the ends of their intervals, NaN where unknown.
+void tell_survival(const std::vector<markov::MeshEstimate>& survival, py::dict& arrays) {
+  std::vector<double> shares{1}, ends{1, 1};
+  for (const markov::MeshEstimate& one : survival)
     shares.push_back(one.value), ends.push_back(one.lower), ends.push_back(one.upper);
-  arrays["survival"] = survival_array(shares);
+  arrays["survival"] = array_of(std::move(shares));
   arrays["survival_interval_95"] =
-      array_of(std::move(ends)).reshape(std::vector<py::ssize_t>{static_cast<py::ssize_t>(shares.size()) + 1, 2});
+      array_of(std::move(ends)).reshape(std::vector<py::ssize_t>{static_cast<py::ssize_t>(survival.size()) + 1, 2});
 }
 
 struct Asked {
@@ -110,9 +104,9 @@ py::dict study_walkers(const py::list& settings, const py::dict& options, const 
     tables.push_back(splitting_table(*found.splitting, {command, {}, request.study.seed, version()}));
   py::dict arrays;
   if (request.settings.size() == 1 && found.studies.empty())
-    tell_survival(found.splitting->passage, arrays);
+    tell_survival(found.splitting->passage.survival, arrays);
   else if (request.settings.size() == 1)
-    arrays["survival"] = survival_array(found.studies.front().passage.survival);
+    tell_survival(found.studies.front().passage.survival, arrays);
   return answer(walker_answer_json(request, found), walker_answer_text(request, found, line_width), tables_html(tables),
                 arrays);
 }
@@ -225,10 +219,7 @@ py::dict study_map(const py::dict& fields, const py::dict& options, const std::s
   });
   const Provenance provenance{command, python.name, asked.mesh.seed, version()};
   py::dict arrays;
-  if (on_mesh)
-    arrays["survival"] = survival_array(found.passage.survival);
-  else
-    tell_survival(splitting->passage, arrays);
+  tell_survival(on_mesh ? found.passage.survival : splitting->passage.survival, arrays);
   if (!on_mesh)
     return answer(splitting_json(*splitting, moments, provenance), splitting_text(*splitting, moments, line_width),
                   to_html(splitting_table(*splitting, provenance)), arrays);

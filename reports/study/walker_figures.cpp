@@ -190,11 +190,8 @@ Figure walker_survival_figure(const std::vector<StudiedWalker>& walkers, const P
     for (std::size_t i = 0; i <= most_survival_points; ++i) {
       const double n = std::floor(std::pow(last, static_cast<double>(i) / most_survival_points));
       if (!line.x.empty() && n <= line.x.back()) continue;
-      const auto at = static_cast<std::size_t>(n) - 1;
-      const double beyond = n - static_cast<double>(study.survival.size());
       line.x.push_back(n);
-      line.y.push_back(beyond <= 0 ? study.survival[at]
-                                   : study.survival.back() * std::exp(beyond * std::log1p(-study.failure_rate.value)));
+      line.y.push_back(markov::survival_after(study, static_cast<std::uint64_t>(n)).value);
     }
     figure.series.push_back(std::move(line));
   }

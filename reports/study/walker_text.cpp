@@ -37,8 +37,14 @@ WalkerJson mesh_estimate_json(const MeshEstimate& e) {
 // Where the study's survival begins with the share that survives one step, P(steps > n) begins at n = 0.
 WalkerJson survival_json(const markov::MeshStudy& s) {
   WalkerJson survival = {1.0};
-  for (const double share : s.survival) survival.push_back(share);
+  for (const MeshEstimate& share : s.survival) survival.push_back(share.value);
   return survival;
+}
+
+WalkerJson survival_ends_json(const markov::MeshStudy& s) {
+  WalkerJson ends = {WalkerJson{1.0, 1.0}};
+  for (const MeshEstimate& share : s.survival) ends.push_back({share.lower, share.upper});
+  return ends;
 }
 
 WalkerJson mesh_study_json(const std::string& name, const markov::MeshStudy& s) {
@@ -61,6 +67,7 @@ WalkerJson mesh_study_json(const std::string& name, const markov::MeshStudy& s) 
           {"expected_steps", steps},
           {"failure_rate_per_step", mesh_estimate_json(s.failure_rate)},
           {"survival", survival_json(s)},
+          {"survival_interval_95", survival_ends_json(s)},
           {"mixing_steps", s.mixing_steps},
           {"relative_errors",
            {{"shifts", s.shift_error},

@@ -3,8 +3,10 @@
 #include "analysis/gap/trial_groups.h"
 
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 #include <functional>
 #include <memory>
@@ -106,6 +108,28 @@ TEST(TrialGroups, ABreakIsHeldAgainstADrift) {
   EXPECT_GT(at->gain, 20);
   EXPECT_LT(broken(drift)->gain, 0);
   EXPECT_FALSE(broken({step.begin(), step.begin() + 8})) << "too few";
+}
+
+// Of parameters that are known, all trials of the other machine differ one way, and by many sds of a sharp sensor.
+TEST(TrialGroups, AreSaidWhereTheOtherMachineAloneDiffersFromTheModel) {
+  Machine machine = linear_machine(0.002);
+  for (MachineParameter& p : machine.parameters) p.sd = 0;
+  machine.parameters[0].nominal = 0.2;
+  machine.effects.push_back({"push", {{"more", 0, -1, 1}}});
+  machine.step = [step = machine.step, more = machine.value_names().size() - 1](const MachineBatch& batch) {
+    step(batch);
+    for (std::size_t i = 0; i < batch.rows; ++i) batch.next[i] += batch.value(more, i);
+  };
+  const auto next = [](double x, double z, std::size_t t) { return 0.2 * x + 0.3 + (t % 2 == 1 ? 3 : 0) + 0.2 * z; };
+  DiagnosisOptions options;
+  options.draws = 400;
+  options.catalogue = {"push", "sensor_noise_x"};
+  const auto model =
+      machine_transitions(std::make_shared<const Machine>(machine), scalar_runs(trials, 14, 0.4, 0.002, 1, next));
+  const Diagnosis d = decide_each(*model, options, {options.rules}).front();
+  EXPECT_TRUE(std::ranges::any_of(d.data.notes, [](const std::string& note) {
+    return note.find("20 of 40 (trials ") != std::string::npos;
+  })) << fmt::format("{}", fmt::join(d.data.notes, "\n"));
 }
 
 // At most one folder of a hundred is said to hold two machines by chance: of these 35 one may be.

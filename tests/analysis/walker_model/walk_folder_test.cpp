@@ -2,6 +2,7 @@
 
 #include "analysis/walker_model/walk_folder.h"
 
+#include <fmt/format.h>
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -104,6 +105,43 @@ TEST_F(WalkFolder, WhatIsWrongIsNamedWithItsPlace) {
   has(with(&WalkFiles::steps_csv, "swing_rate_rad_s", "swing"), "swing");
   has(with(&WalkFiles::trials_csv, "stopped", "halted"), "'halted' is none of failed, stopped, lost");
   has(with(&WalkFiles::trials_csv, "\n6,", "\n7,"), "steps.csv has no trial 7");
+}
+
+TEST_F(WalkFolder, LegsTakeTurnsWhereBothAreNamed) {
+  WalkFiles files = drawn({}, 1, Walker::simplest);
+  files.trials_csv = "trial,outcome\n1,stopped\n";
+  const auto with = [&](const std::string& phases) {
+    files.steps_csv = "trial,step,phase,half_angle_rad,stance_rate_rad_s\n";
+    for (std::size_t k = 0; k < phases.size(); ++k)
+      files.steps_csv += fmt::format("1,{},{},0.2,-0.2\n", k + 1, phases[k] == ' ' ? "" : phases.substr(k, 1));
+    write(files);
+    return read_walks(folder_)->runs.trials.front().rows.size();
+  };
+  const auto refusal = [&](const std::string& phases) { return message_of<InputError>([&] { with(phases); }); };
+  const std::string file = (folder_ / "steps.csv").string();
+  EXPECT_EQ(refusal("121221"),
+            file + ":6:5: phase: leg 2 does not stand after leg 2: a row is missing, or out of order");
+  EXPECT_EQ(refusal("12 1"),
+            file + ":5:5: phase: leg 1 does not stand 2 rows after leg 2: a row is missing, or out of order");
+  for (const char* phases : {"2121", "12 2", "1111", "    "}) EXPECT_EQ(with(phases), 4u) << phases;
+}
+
+// Columns that mean something else than their names say are likelier than a walker that falls at every step.
+TEST_F(WalkFolder, SaysWhatToCheckWhereTheWalkerFailsFromMostRows) {
+  for (const Walker walker : {Walker::compass, Walker::simplest}) {
+    write(drawn({}, 6, walker));
+    Walks walks = *read_walks(folder_);
+    for (MachineTrial& trial : walks.runs.trials)
+      for (MachineRow& row : trial.rows) row.seen[1] *= -1;
+    const std::string message = message_of<std::invalid_argument>([&] { diagnose_walks(walks, {}); });
+    const char* gait = walker == Walker::compass ? "half_angle_rad is 0.271, stance_rate_rad_s is -1.09, swing_rate_"
+                                                 : "half_angle_rad is 0.2, stance_rate_rad_s is -0.2;";
+    EXPECT_NE(message.find(gait), std::string::npos) << message;
+    EXPECT_NE(message.find("check that angles are in radians, that half_angle_rad is half the angle between the legs, "
+                           "and the signs of the rates"),
+              std::string::npos)
+        << message;
+  }
 }
 
 TEST_F(WalkFolder, WithoutAKnownModelOneSentenceSaysWhatToWrite) {

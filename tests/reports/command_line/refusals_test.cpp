@@ -42,6 +42,18 @@ TEST_F(Refusals, OfWheelsThatSettledDoesNotHold) {
   });
 }
 
+// Of a folder of walks it is known only once they are read which effects there are.
+TEST_F(Refusals, NameTheOptionWhoseValueTheDiagnosisDoesNotKnow) {
+  const std::string walks = path("walks");
+  ASSERT_EQ(metastable({"simulate", "--walker", "simplest", "--slope-sd", "0.05", "--trials", "2", "--collisions", "4",
+                        "--out", walks})
+                .code,
+            0);
+  const Ran ran = metastable({"diagnose", walks, "--catalogue", "hip_dampng"});
+  EXPECT_EQ(ran.code, 2);
+  EXPECT_EQ(ran.err.find("metastable: --catalogue: 'hip_dampng' is none of "), 0u) << ran.err;
+}
+
 TEST_F(Refusals, OfOptionsThatDoNothing) {
   expect_refused({
       {{"steps", "--leg-count", "12"}, "--leg-count: has a meaning where --legs is one length; it is 'paper'"},

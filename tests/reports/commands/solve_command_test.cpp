@@ -39,6 +39,21 @@ TEST_F(SolveCommand, SaysTheValueOrThatItIsOutOfReach) {
   EXPECT_EQ(none.out.find("rigid bodies"), std::string::npos);
 }
 
+// What is solved for has no value yet.
+TEST(SolveAnswerText, IsHeadedByWhatDoesNotVaryOfAWalker) {
+  SolveRequest request;
+  request.walker = analysis::WalkerSetting{analysis::Walker::simplest, 0.5, 0.25, dynamics::Terrain::fresh};
+  const auto heading = [&] {
+    const std::string text = solve_answer_text(request, {});
+    EXPECT_EQ(nlohmann::json::parse(solve_answer_json(request, {})).at("provenance").at("settings"),
+              text.substr(0, text.find('\n')));
+    return text.substr(0, text.find('\n'));
+  };
+  EXPECT_EQ(heading(), "walker simplest, slope varies, sd 0.25 deg, terrain fresh");
+  request.of_slope_sd = true;
+  EXPECT_EQ(heading(), "walker simplest, slope 0.5 deg, sd varies, terrain fresh");
+}
+
 // A wrong option, key or value gives exit code 2 and one line that names it and what is allowed.
 TEST_F(SolveCommand, WrongInputIsOneLineAndCodeTwo) {
   expect_refused({

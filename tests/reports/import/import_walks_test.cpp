@@ -61,6 +61,14 @@ TEST_F(Import, WideWalks) {
             "trial,step,half_angle_rad\n1,1,0.27\n1,2,\n1,3,0.26\n2,1,0.28\n2,2,0.27\n");
 }
 
+// A row was lost before the third one, and the file does not count its rows.
+TEST_F(Import, RefusesWalksWhoseLegsDoNotTakeTurns) {
+  const std::string csv = file("lost.csv", "run,foot,theta\n1,0,0.27\n1,1,0.28\n1,1,0.27\n2,0,0.27\n");
+  expect_refused(import({csv, "--walker", "simplest", "--slope", "0.5", "--slope-sd", "0.05", "--legs-from", "0",
+                         "--columns", "trial=run,phase=foot,half_angle=theta[rad]"}),
+                 csv + ":4: phase: leg 2 does not stand after leg 2: a row is missing, or out of order");
+}
+
 TEST_F(Import, NamesWhatWalksLack) {
   const std::string csv = file("a.csv", "run,foot,theta\n1,0,15\n1,1,14\n");
   const auto walks = [&](Words more) {
