@@ -55,8 +55,11 @@ std::vector<MeshEstimate> extrapolated_survival(
   return survival;
 }
 
-MeshEstimate survival_after(std::span<const MeshEstimate> survival, const MeshEstimate& rate, std::uint64_t steps) {
-  const std::size_t known = std::min<std::size_t>(steps, survival.size());
+MeshEstimate survival_after(std::span<const MeshEstimate> survival, const MeshEstimate& rate, std::uint64_t steps,
+                            std::size_t phases) {
+  const std::size_t all = survival.size();
+  const std::uint64_t revolutions = steps > all ? (steps - all + phases - 1) / phases : 0;
+  const std::uint64_t known = steps - std::min(steps, revolutions * phases);
   const MeshEstimate head = known > 0 ? survival[known - 1] : MeshEstimate{1, 1, 1};
   const auto beyond = static_cast<double>(steps - known);
   const auto on = [beyond](double share, double failing) {

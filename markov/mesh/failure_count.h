@@ -35,8 +35,10 @@ std::vector<MeshEstimate> extrapolated_survival(
     const std::function<Extrapolated(const std::vector<std::vector<double>>&)>& extrapolate);
 
 /// Returns the share that walks on after so many steps.
-/// @param survival  after 1, 2, ... steps @param rate  chance of failing in each step beyond
-MeshEstimate survival_after(std::span<const MeshEstimate> survival, const MeshEstimate& rate, std::uint64_t steps);
+/// @param survival  after 1, 2, ... steps, until each revolution fails alike
+/// @param rate  chance of failing in a step, in the mean over a revolution @param phases  steps of one, >= 1
+MeshEstimate survival_after(std::span<const MeshEstimate> survival, const MeshEstimate& rate, std::uint64_t steps,
+                            std::size_t phases);
 
 /// Holds walks of which each failed within so many steps or walked on. Whatever happens in a walk, walks are
 /// independent: their number of failures is binomial, also where failures come in clusters or very late.

@@ -87,7 +87,7 @@ inline MeshEstimate steps_from_quasi_stationary(const MeshStudy& study) {
 
 /// Returns the share that walks on after so many steps.
 inline MeshEstimate survival_after(const MeshStudy& study, std::uint64_t steps) {
-  return survival_after(study.survival, study.failure_rate, steps);
+  return survival_after(study.survival, study.failure_rate, steps, study.frames.size());
 }
 
 /// Returns the spacing of the scores that a study's meshes take.

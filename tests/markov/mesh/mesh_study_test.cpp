@@ -110,6 +110,25 @@ TEST(MeshStudy, PhasesAgreeWithSimulation) {
   EXPECT_EQ(study.disagreement, "");
 }
 
+TEST(MeshStudy, SharesThatWalkOnAreThoseOfSimulationAndAddUpToTheSteps) {
+  const std::vector<double> start{2};
+  for (const BatchMap& map : {linear_batch(1.2), two_phase_batch(1.2)}) {
+    const MeshStudy study = mesh_study(map, start, {.guided_samples = 0, .simulated_steps = 0});
+    double sum = 0;
+    for (std::uint64_t n = 0; n < 5000; ++n) sum += survival_after(study, n).value;
+    EXPECT_NEAR(sum / study.steps.value, 1, 2e-3);
+    const std::uint64_t longest = 60;
+    const std::vector<std::uint64_t> walks = follow_walks(map, start, longest, {.trials = 100000, .seed = 3});
+    for (const std::uint64_t n : {1U, 2U, 5U, 20U, 60U}) {
+      const auto on = std::ranges::count_if(walks, [n](std::uint64_t failed) { return failed == 0 || failed > n; });
+      const double share = static_cast<double>(on) / static_cast<double>(walks.size());
+      const MeshEstimate told = survival_after(study, n);
+      EXPECT_NEAR(told.value, share, 4 * std::sqrt(share * (1 - share) / 1e5) + (told.upper - told.lower)) << n;
+      EXPECT_LT(told.upper - told.lower, 0.02) << n;
+    }
+  }
+}
+
 // The start is an unstable orbit, beside which the map walks on with period two; simulation knows the same.
 TEST(MeshStudy, FollowsGaitsThatComeBackAfterTwoSteps) {
   for (const double sd : {0.4, 0.3, 0.25}) {  // 228 to 2.1e4 steps
