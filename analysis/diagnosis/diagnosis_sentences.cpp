@@ -135,7 +135,7 @@ void say_what_stays(std::vector<std::string>& s, const Diagnosis& d) {
                   d.causes.unnamed_share ? fmt::format(", {} of the gap", percent(*d.causes.unnamed_share)) : "",
                   d.causes.p_unnamed, where));
   if (!d.causes.stand_ins.empty())
-    s.push_back(fmt::format("In its place the best model has {}, too unlikely to be named.",
+    s.push_back(fmt::format("The likeliest model has {} in the place of what has no name, too unlikely to be named.",
                             fmt::join(d.causes.stand_ins, " and ")));
   say_cost_of_ignoring(s, d);
 }

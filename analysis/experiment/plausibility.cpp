@@ -23,6 +23,7 @@ constexpr double turn = 2 * std::numbers::pi;
 // The mean speed of a step over the speed at its end is 0.56 to 0.72 in the middle of what engines and the virtual
 // laboratory roll, at most 0.96, and falls as a wheel comes slowly over its foot. Units differ by more.
 constexpr double least_time_share = 0.15, most_time_share = 1.5;
+constexpr std::size_t least_steps_to_judge = 10;  // Times of a condition are judged from so many steps on.
 // A step is a chord, up to 1.4 where feet slide, 1.00 to 1.04 in the middle of what engines roll. Lengths of legs that
 // are diameters make it half of one, two legs of eight that are not listed 0.76.
 constexpr double least_step_share = 0.85, most_step_share = 1.6;
@@ -157,18 +158,18 @@ class Plausible {
 
   // A wheel turns by a leg angle from collision to collision, at speeds below those before and behind.
   void times() {
-    std::vector<double> share;
-    steps([&](std::size_t, std::size_t, const MeasuredCollision& last, const MeasuredCollision& next) {
-      if (last.time && next.time && next.omega_minus > 0)
-        share.push_back(experiment_.wheel.leg_angle() / (*next.time - *last.time) / next.omega_minus);
+    std::vector<double> all;
+    std::vector<std::vector<double>> of(experiment_.conditions.size());
+    steps([&](std::size_t t, std::size_t, const MeasuredCollision& last, const MeasuredCollision& next) {
+      if (!last.time || !next.time || next.omega_minus <= 0) return;
+      all.push_back(experiment_.wheel.leg_angle() / (*next.time - *last.time) / next.omega_minus);
+      of[experiment_.trials[t].condition].push_back(all.back());
     });
-    if (share.empty()) return;
-    const double middle = median(share);
-    if (middle >= least_time_share && middle <= most_time_share) return;
-    defects_.add(file_, {1, 1},
-                 fmt::format("time_s: half of the steps would turn the wheel at {:.3g} of its speed before the next "
-                             "collision, where 0.5 to 1 of it is usual{}",
-                             middle, suspected(time_units, 0.75 / middle, least_time_share, most_time_share)));
+    if (all.empty() || refused_times(std::move(all), "")) return;
+    for (std::size_t c = 0; c < of.size(); ++c)
+      if (of[c].size() >= least_steps_to_judge &&
+          refused_times(std::move(of[c]), fmt::format(" of condition '{}'", experiment_.conditions[c].id)))
+        return;
   }
 
   void positions() {
@@ -206,6 +207,16 @@ class Plausible {
   }
 
  private:
+  // Says whether half of the steps are in another unit of time, which is reported.
+  bool refused_times(std::vector<double> share, const std::string& where) {
+    const double middle = median(std::move(share));
+    if (middle >= least_time_share && middle <= most_time_share) return false;
+    defects_.add(file_, {1, 1},
+                 fmt::format("time_s: half of the steps{} would turn the wheel at {:.3g} of its speed before the next "
+                             "collision, where 0.5 to 1 of it is usual{}",
+                             where, middle, suspected(time_units, 0.75 / middle, least_time_share, most_time_share)));
+    return true;
+  }
   void each(const std::function<void(std::size_t, std::size_t, const MeasuredCollision&)>& look) const {
     for (std::size_t t = 0; t < experiment_.trials.size(); ++t)
       for (std::size_t i = 0; i < experiment_.trials[t].collisions.size(); ++i)

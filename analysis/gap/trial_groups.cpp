@@ -24,12 +24,13 @@ constexpr double least_share = 0.1;  // of the trials, in the smaller group
 constexpr int split_draws = 2000;    // for the chance level of one split
 constexpr int counted_draws = 60;    // beyond which its tail follows an exponential law
 constexpr double poor_share = 0.1;   // of the usual information of a step: a trial says next to nothing
-constexpr double most_poor = 0.1;    // share of the steps that trials may hold which say so little
-// What changes the spread of scores moves each of them away from 0 or towards it: of all moves, so large a share goes
-// one way. What changes their mean moves those of one machine of two both ways, and it holds a tenth of the trials.
-constexpr double one_sided = 0.95;
-constexpr double least_apart = 3;      // sds of a trial: groups that overlap more are none
-constexpr std::size_t most_named = 5;  // trials in the sentence
+constexpr double most_poor = 0.1;    // Trials that say so little may hold this share of the steps.
+// What changes the spread of scores gains or loses by nearly every step, whatever moves their mean by some alone. Where
+// one machine of two is far off the model it outweighs the other: those trials that fit best are asked by themselves.
+constexpr double one_sided = 0.8;
+constexpr std::size_t best_fitting = 5;  // The best fitting trials are one of so many.
+constexpr double least_apart = 3;        // sds of a trial: groups that overlap more are none
+constexpr std::size_t most_named = 5;    // trials in the sentence
 constexpr double least_weight = 1e-12;
 constexpr int drift_degree = 3;                 // of a polynomial that a break is held against
 constexpr std::size_t fewest_for_a_break = 12;  // trials
@@ -75,6 +76,30 @@ Direction direction(std::string name, const Derivatives& columns, Eigen::Index p
   return {std::move(name), columns.change.col(p), columns.slope.col(p) + z.cwiseProduct(columns.change.col(p))};
 }
 
+// Sums up what the steps of a trial gain from a parameter.
+struct OneSided {
+  double gains = 0, sizes = 0, squares = 0, steps = 0;
+  void add(double gain, double score) {
+    gains += gain;
+    sizes += std::abs(gain);
+    squares += score * score;
+    ++steps;
+  }
+};
+
+// Says whether a parameter changes the spread of scores: nearly all steps gain by it, or nearly all lose.
+bool changes_spread(std::vector<OneSided> trials) {
+  std::erase_if(trials, [](const OneSided& one) { return one.steps == 0; });
+  std::ranges::sort(trials, {}, [](const OneSided& one) { return one.squares / one.steps; });
+  const auto goes_one_way = [&](std::size_t count) {
+    double gains = 0, sizes = 0;
+    for (std::size_t t = 0; t < count; ++t) gains += trials[t].gains, sizes += trials[t].sizes;
+    return std::abs(gains) > one_sided * sizes;
+  };
+  const std::size_t few = std::min(trials.size(), std::max(fewest_in_group, trials.size() / best_fitting));
+  return goes_one_way(trials.size()) && goes_one_way(few);
+}
+
 // Returns [trials] what the scores say of a parameter by itself, in the trials whose steps tell of it; nothing where
 // trials with many of the steps do not, as of what depends on their order, and of what changes the spread of scores.
 // Steps weigh alike: trials far off the model have another information, and few of them must not stand for all. Where
@@ -83,22 +108,21 @@ Direction direction(std::string name, const Derivatives& columns, Eigen::Index p
 std::vector<TrialValue> trial_values(const TransitionModel& model, const Direction& direction,
                                      const std::vector<double>& score) {
   std::vector<double> along(model.trials()), weight(model.trials()), events(model.trials());
-  double outwards = 0, sizes = 0;
+  std::vector<OneSided> sides(model.trials());
   for (std::size_t e = 0; e < model.events().size(); ++e) {
     const Event& event = model.events()[e];
     if (event.kind == EventKind::launch) continue;
     const bool outcome = event.kind == EventKind::rest || event.kind == EventKind::survival;  // which has no speed
     const double c = direction.change[static_cast<Eigen::Index>(e)];
     along[event.trial] += c * score[e] - (outcome ? 0 : direction.stretch[static_cast<Eigen::Index>(e)]);
-    outwards += score[e] < 0 ? -c : c;
-    sizes += std::abs(c);
+    sides[event.trial].add(c * score[e], score[e]);
     weight[event.trial] += c * c;
     ++events[event.trial];
   }
   std::vector<double> rates;
   for (std::size_t t = 0; t < weight.size(); ++t)
     if (events[t] > 0) rates.push_back(weight[t] / events[t]);
-  if (rates.empty() || std::abs(outwards) > one_sided * sizes) return {};
+  if (rates.empty() || changes_spread(std::move(sides))) return {};
   const double usual = median(rates);
   double poor = 0, all = 0;
   for (std::size_t t = 0; t < weight.size(); ++t) {

@@ -74,26 +74,12 @@ void require_effect(const MachineEffect& effect) {
   }
 }
 
-// Endings of names, of two that fit the longer one first, and the units that they stand for.
-constexpr std::pair<std::string_view, std::string_view> unit_endings[] = {{"rad_s2", "rad/s^2"},
-                                                                          {"rad_s", "rad/s"},
-                                                                          {"rad", "rad"},
-                                                                          {"deg_s", "deg/s"},
-                                                                          {"deg", "deg"},
-                                                                          {"m_s2", "m/s^2"},
-                                                                          {"kg_m2", "kg m^2"},
-                                                                          {"n_m_s2", "N m s^2"},
-                                                                          {"n_m_s", "N m s"},
-                                                                          {"m_s", "m/s"},
-                                                                          {"n_m", "N m"},
-                                                                          {"kg", "kg"},
-                                                                          {"mm", "mm"},
-                                                                          {"cm", "cm"},
-                                                                          {"ms", "ms"},
-                                                                          {"hz", "Hz"},
-                                                                          {"m", "m"},
-                                                                          {"s", "s"},
-                                                                          {"n", "N"}};
+// Names end in these words for units; where two fit, the first counts.
+constexpr std::pair<std::string_view, std::string_view> unit_endings[] = {
+    {"rad_s2", "rad/s^2"}, {"rad_s", "rad/s"}, {"rad", "rad"}, {"deg_s", "deg/s"},  {"deg", "deg"},
+    {"n_m_s2", "N m s^2"}, {"n_m_s", "N m s"}, {"n_m", "N m"}, {"kg_m2", "kg m^2"}, {"m_s2", "m/s^2"},
+    {"m_s", "m/s"},        {"kg", "kg"},       {"mm", "mm"},   {"cm", "cm"},        {"ms", "ms"},
+    {"hz", "Hz"},          {"m", "m"},         {"s", "s"}};
 
 // Refuses an empty name, and one that is given twice.
 void require_distinct(const std::string& what, const std::vector<std::string>& names) {
@@ -109,7 +95,9 @@ void require_distinct(const std::string& what, const std::vector<std::string>& n
 std::string Machine::unit_of(const std::string& name) const {
   if (const auto stated = units.find(name); stated != units.end()) return stated->second;
   for (const auto& [ending, unit] : unit_endings) {
-    if (name == fmt::format("per_{}", ending)) return fmt::format("1/{}", unit);
+    if (name == fmt::format("per_{}", ending) || name.ends_with(fmt::format("_per_{}", ending)))
+      return unit.find_first_of(" /") == std::string_view::npos ? fmt::format("1/{}", unit)
+                                                                : fmt::format("1/({})", unit);
     if (name.ends_with(fmt::format("_{}", ending))) return std::string(unit);
   }
   return "";

@@ -439,13 +439,12 @@ std::string machine_effect_unit(const Machine& machine, const std::string& effec
     if (parameter == plain) return "";
   for (const char* place : {"frequency_hz", "from_m", "to_m"})
     if (parameter == place) return Machine{}.unit_of(parameter);
-  // The names of such effects begin with the parameter or end with the state that they change.
-  std::string changed;
+  for (const std::string& state : machine.states)
+    for (const char* of : {"sensor_noise_", "sensor_bias_", "launch_", "launch_spread_"})
+      if (effect == of + state) return machine.unit_of(state);
+  std::string changed;  // It is the longest name that the effect begins with.
   for (const std::string& varying : machine.may_vary)
     if (effect.starts_with(varying + "_") && varying.size() > changed.size()) changed = varying;
-  const bool varies = !changed.empty();
-  for (const std::string& state : machine.states)
-    if (!varies && effect.ends_with("_" + state) && state.size() > changed.size()) changed = state;
   return machine.unit_of(changed);
 }
 

@@ -23,7 +23,7 @@ constexpr std::size_t violation_draws = 65536, launch_violation_draws = 4096, fe
 constexpr double least_violated = 1e-9;  // share of collisions at a state
 constexpr std::size_t slowest_draws = 16384;
 constexpr std::size_t most_forward = 100000;  // steps followed where some states never rest
-constexpr double still_resting = 1e-6;        // share of the launches that may be left to rest after them
+constexpr double still_resting = 1e-6;        // This share of the launches may be left to rest after them.
 constexpr double same_chain = 1e-6;           // agreement wanted of two ways to solve it
 constexpr double same_spectrum = 1e-6;        // and of two ways to its lambda_1
 constexpr double frequent_rest = 0.01;        // a step

@@ -4,6 +4,7 @@
 #include <stdexcept>
 #include <vector>
 
+#include "dynamics/catalogue/walker_effects.h"
 #include "dynamics/walkers/uneven_walker.h"
 
 namespace metastable::analysis {
@@ -84,12 +85,19 @@ Machine walker_machine(const WalkerStatement& statement) {
                      {"hip_dry_friction", {{"torque", 0, 0, compass ? 5.0 : 0.5}}},
                      {"impact_loss", {{"share", 0, -0.3, 0.3}}},
                      {"foot_slip", {{"slip", 0, 0, 0.2}}}};
-  if (!compass) machine.units = {{"stance_rate_rad_s", "rad/sqrt(l/g)"}, {"slip", "leg lengths"}};
-  if (compass)
-    machine.units = {{"damping", "N m s/rad"}, {"torque", "N m"}, {"slip", "m"}, {"higher", "m"}, {"longer", "m"}};
+  if (compass) {
+    for (const MachineEffect& effect : machine.effects)
+      for (const SuspectedParameter& p : effect.parameters)
+        for (const dynamics::EffectParameter& known : dynamics::walker_effect_info(effect.id).parameters)
+          if (known.name == p.name) machine.units[p.name] = known.unit;
+  } else {  // Its lengths are in legs, its times in sqrt(l/g).
+    machine.units = {
+        {"stance_rate_rad_s", "rad sqrt(g/l)"}, {"damping", "sqrt(g/l)"}, {"torque", "g/l"}, {"slip", "leg lengths"}};
+  }
   if (!compass || !statement.legs) return machine;
   machine.effects.push_back({"leg_mass", {{"mass_ratio", 1, 0.5, 2}, {"higher", 0, -0.2, 0.2}}});
   machine.effects.push_back({"leg_length", {{"longer", 0, -0.05, 0.05}}});
+  machine.units["higher"] = machine.units["longer"] = "m";
   machine.inputs = {"stance_leg"};
   return machine;
 }

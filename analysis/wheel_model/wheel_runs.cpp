@@ -46,19 +46,6 @@ constexpr double chance_of_deviation = 4;
 
 std::vector<ExtendedWheel> stated_wheels(const WheelRuns& measured) { return wheels_on_ramps(measured, {}, {}); }
 
-// Returns the next omega- that follows from the speeds around a collision; under `settled` as if the foot stuck.
-std::optional<double> expected_next(const ExtendedWheel& wheel, const dynamics::StepContext& context,
-                                    const RunCollision& m) {
-  if (!wheel.settles()) return wheel.next(context, *m.after);
-  constexpr double high = 0.5, much_friction = 10;
-  const auto dead = wheel.omega_plus(context, m.before, {0, much_friction}, false);
-  const auto springy = wheel.omega_plus(context, m.before, {high, much_friction}, false);
-  if (!dead || !springy) return std::nullopt;
-  const double eta = high * (*m.after - *dead) / (*springy - *dead);
-  if (!(eta > -0.1 && eta < 0.8)) return std::nullopt;
-  return wheel.land(context, m.before, {std::max(0.0, eta), much_friction}, false).next;
-}
-
 // Returns the median distance of values from `middle`.
 double median_deviation(std::vector<double> values, double middle) {
   for (double& value : values) value = std::abs(value - middle);
@@ -410,6 +397,18 @@ std::vector<ExtendedWheel> wheels_on_ramps(const WheelRuns& measured, const dyna
   return all;
 }
 
+std::optional<double> expected_next(const ExtendedWheel& wheel, const dynamics::StepContext& context,
+                                    const RunCollision& m) {
+  if (!wheel.settles()) return wheel.next(context, *m.after);
+  constexpr double high = 0.5, much_friction = 10;
+  const auto dead = wheel.omega_plus(context, m.before, {0, much_friction}, false);
+  const auto springy = wheel.omega_plus(context, m.before, {high, much_friction}, false);
+  if (!dead || !springy) return std::nullopt;
+  const double eta = high * (*m.after - *dead) / (*springy - *dead);
+  if (!(eta > -0.1 && eta < 0.8)) return std::nullopt;
+  return wheel.land(context, m.before, {std::max(0.0, eta), much_friction}, false).next;
+}
+
 void tabulate_landings(WheelRuns& measured) {
   measured.landings.clear();
   if (measured.law != dynamics::Law::settled) return;
@@ -487,6 +486,8 @@ WheelRuns wheel_runs(const Experiment& experiment) {
   find_legs(measured, leg_column);
   if (leg_column)
     if (const auto question = question_on_leg_order(measured, experiment)) measured.notes.push_back(*question);
+  if (measured.legs_known || measured.wheel.equal_legs())
+    if (const auto question = question_on_rows(measured)) measured.notes.push_back(*question);
   for (const std::string& note : experiment.notes)
     if (note.ends_with('?')) measured.notes.push_back(note);
   if (!leg_column && !measured.legs_known) tabulate_landings(measured);  // of legs of the mean length

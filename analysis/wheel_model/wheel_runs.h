@@ -63,6 +63,11 @@ struct WheelRuns {
 std::vector<dynamics::ExtendedWheel> wheels_on_ramps(const WheelRuns& measured, const dynamics::ContactSpread& contact,
                                                      const dynamics::Extension& extension);
 
+/// Returns the next omega- that follows from the speeds around a collision [rad/s]; under `settled` as if the foot
+/// stuck. It returns nothing where no restitution gives these speeds. @param m  with an omega+
+std::optional<double> expected_next(const dynamics::ExtendedWheel& wheel, const dynamics::StepContext& context,
+                                    const RunCollision& m);
+
 /// Says how good `settled` is as a model of rigid-body engines: by so much a next omega- is off in a way that goes with
 /// leg, slope and speed [rad/s]. It does not average out, so n touches are given an error of sqrt(n) times it, after
 /// which they tell no mean more exactly. (The engine of the paper's wheel with steps of 0.1 ms: medians of legs by

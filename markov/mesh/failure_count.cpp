@@ -31,28 +31,48 @@ double ForetoldHazard::at(std::uint64_t steps) const {
 std::vector<MeshEstimate> extrapolated_survival(
     const std::vector<std::vector<ForetoldHazard>>& hazards, double leaving,
     const std::function<Extrapolated(const std::vector<std::vector<double>>&)>& extrapolate) {
-  const std::vector<double>& finest = hazards.front().back().survival;
+  constexpr double rounding = 1e-12;  // A hazard below it is what is left of shares next to 1.
+  std::size_t steps = hazards.front().back().survival.size();
+  for (const auto& sizes : hazards)
+    for (const ForetoldHazard& one : sizes) steps = std::min(steps, one.survival.size());
   std::vector<MeshEstimate> survival;
   std::vector<std::vector<double>> logs(hazards.size(), std::vector<double>(hazards.front().size()));
-  for (std::size_t k = 0; k < finest.size(); ++k) {
-    bool seen = true;
+  for (std::size_t k = 0; k < steps; ++k) {
+    double least = std::numeric_limits<double>::infinity(), most = 0;
     for (std::size_t shift = 0; shift < hazards.size(); ++shift)
       for (std::size_t size = 0; size < hazards[shift].size(); ++size) {
-        logs[shift][size] = std::log(hazards[shift][size].at(k + 1));
-        seen = seen && std::isfinite(logs[shift][size]);
+        const double hazard = hazards[shift][size].at(k + 1);
+        least = std::min(least, hazard), most = std::max(most, hazard);
+        logs[shift][size] = std::log(hazard);
       }
-    MeshEstimate share{finest[k], finest[k], finest[k]};
-    if (seen) {
-      const MeshEstimate hazard = estimate_of(extrapolate(logs));
-      share = {std::exp(-hazard.value), std::exp(-hazard.upper * std::exp(leaving)), std::exp(-hazard.lower)};
-    }
-    // Extrapolated shares fall like those of a mesh.
-    if (k > 0)
-      for (double MeshEstimate::*end : {&MeshEstimate::value, &MeshEstimate::lower, &MeshEstimate::upper})
-        share.*end = std::min(share.*end, survival.back().*end);
-    survival.push_back(share);
+    MeshEstimate hazard{hazards.front().back().at(k + 1), least, most};
+    if (least > rounding && std::isfinite(most)) hazard = estimate_of(extrapolate(logs));
+    survival.push_back({std::exp(-hazard.value), std::exp(-hazard.upper * std::exp(leaving)), std::exp(-hazard.lower)});
+  }
+  // Shares fall: what bounds a later one from below bounds an earlier one, and the other way round from above.
+  for (std::size_t k = 1; k < steps; ++k) {
+    survival[k].value = std::min(survival[k].value, survival[k - 1].value);
+    survival[k].upper = std::min(survival[k].upper, survival[k - 1].upper);
+  }
+  for (std::size_t k = steps; k-- > 0;) {
+    if (k + 1 < steps) survival[k].lower = std::max(survival[k].lower, survival[k + 1].lower);
+    survival[k].lower = std::min(survival[k].lower, survival[k].value);
+    survival[k].upper = std::max(survival[k].upper, survival[k].value);
   }
   return survival;
+}
+
+MeshEstimate extrapolated_rate(
+    const std::vector<std::vector<ForetoldHazard>>& hazards, double leaving,
+    const std::function<Extrapolated(const std::vector<std::vector<double>>&)>& extrapolate) {
+  std::vector<std::vector<double>> logs;
+  for (const auto& sizes : hazards) {
+    logs.emplace_back();
+    for (const ForetoldHazard& one : sizes) logs.back().push_back(std::log(one.rate));
+  }
+  MeshEstimate rate = estimate_of(extrapolate(logs));
+  rate.upper *= std::exp(leaving);
+  return rate;
 }
 
 MeshEstimate survival_after(std::span<const MeshEstimate> survival, const MeshEstimate& rate, std::uint64_t steps,
@@ -61,6 +81,7 @@ MeshEstimate survival_after(std::span<const MeshEstimate> survival, const MeshEs
   const std::uint64_t revolutions = steps > all ? (steps - all + phases - 1) / phases : 0;
   const std::uint64_t known = steps - std::min(steps, revolutions * phases);
   const MeshEstimate head = known > 0 ? survival[known - 1] : MeshEstimate{1, 1, 1};
+  if (known == steps) return head;
   const auto beyond = static_cast<double>(steps - known);
   const auto on = [beyond](double share, double failing) {
     return share * std::exp(beyond * std::log1p(-std::min(failing, 1.0)));

@@ -27,16 +27,22 @@ struct ForetoldHazard {
 };
 
 /// Brings what meshes of several sizes and shifts foretell to the spacing zero, step by step: by ln H, as `extrapolate`
-/// does it with [shift][size]. Where a mesh sees no failure yet, or nobody walks on, it is what the finest one says.
-/// @param hazards  [shift][size], at least one
+/// does it with [shift][size]. Where a mesh sees no failure yet, or nobody walks on, it is what the finest one says,
+/// and the interval spans what all say. It ends where the first mesh does.
+/// @param hazards  [shift][size], at least two shifts
 /// @param leaving  the logarithm by which what leaves the meshes may raise H
 std::vector<MeshEstimate> extrapolated_survival(
     const std::vector<std::vector<ForetoldHazard>>& hazards, double leaving,
     const std::function<Extrapolated(const std::vector<std::vector<double>>&)>& extrapolate);
 
+/// Does the same with the rates beyond.
+MeshEstimate extrapolated_rate(const std::vector<std::vector<ForetoldHazard>>& hazards, double leaving,
+                               const std::function<Extrapolated(const std::vector<std::vector<double>>&)>& extrapolate);
+
 /// Returns the share that walks on after so many steps.
 /// @param survival  after 1, 2, ... steps, until each revolution fails alike
-/// @param rate  chance of failing in a step, in the mean over a revolution @param phases  steps of one, >= 1
+/// @param rate  chance of failing in a step beyond, in the mean over a revolution
+/// @param phases  steps of a revolution, >= 1
 MeshEstimate survival_after(std::span<const MeshEstimate> survival, const MeshEstimate& rate, std::uint64_t steps,
                             std::size_t phases);
 

@@ -352,8 +352,9 @@ class Run {
     study_.steps.lower *= std::exp(-study_.bracket);
     study_.failure_rate = estimate_of(by_rate);
     study_.failure_rate.upper *= std::exp(study_.bracket);
-    study_.survival = extrapolated_survival({hazards_.begin(), hazards_.begin() + static_cast<std::ptrdiff_t>(shifts_)},
-                                            study_.bracket, extrapolated);
+    const std::vector made(hazards_.begin(), hazards_.begin() + static_cast<std::ptrdiff_t>(shifts_));
+    study_.survival = extrapolated_survival(made, study_.bracket, extrapolated);
+    study_.later_rate = extrapolated_rate(made, study_.bracket, extrapolated);
   }
 
   /// Widens the intervals by what the mesh may not have seen, or says that it is too much.
@@ -369,8 +370,10 @@ class Run {
               : fmt::format("up to {:.2g} times the failures that the mesh foretells, which are none", blind.imagined));
     study_.steps.lower /= 1 + blind.missed;
     study_.steps.upper *= 1 + blind.imagined;
-    study_.failure_rate.upper *= 1 + blind.missed;
-    study_.failure_rate.lower /= 1 + blind.imagined;
+    for (MeshEstimate* rate : {&study_.failure_rate, &study_.later_rate}) {
+      rate->upper *= 1 + blind.missed;
+      rate->lower /= 1 + blind.imagined;
+    }
     for (MeshEstimate& share : study_.survival) {
       share.lower = std::pow(share.lower, 1 + blind.missed);
       share.upper = std::pow(share.upper, 1 / (1 + blind.imagined));
@@ -380,9 +383,8 @@ class Run {
   ForetoldHazard hazard() const {
     std::vector<double> survival;
     for (const MeshEstimate& share : study_.survival) survival.push_back(share.value);
-    const double scale = std::exp(steps_[0][sizes_ - 1]) / study_.steps.value;
-    return {std::move(survival), scale * hazards_[0][sizes_ - 1].rate,
-            std::log(study_.steps.value / study_.steps.lower), std::log(study_.steps.upper / study_.steps.value)};
+    return {std::move(survival), study_.later_rate.value, std::log(study_.steps.value / study_.steps.lower),
+            std::log(study_.steps.upper / study_.steps.value)};
   }
 
   std::vector<std::uint64_t> follow(std::size_t walks, std::uint64_t longest) const {

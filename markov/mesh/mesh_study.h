@@ -1,6 +1,7 @@
 #pragma once
 // Finds expected steps of any return map with an interval, and what two independent ways say of it.
 
+#include <algorithm>
 #include <array>
 #include <cstdint>
 #include <functional>
@@ -47,8 +48,10 @@ struct MeshStudy {
   MeshEstimate steps;         ///< expected steps before failure from the start
   MeshEstimate failure_rate;  ///< a step, from the quasi-stationary distribution
   double mixing_steps = 0;
-  /// Holds the shares that walk on after 1, 2, ... steps, until they fall by the failure rate: see survival_after().
+  /// Holds the shares that walk on after 1, 2, ... steps, until they fall by `later_rate` a step (survival_after()):
+  /// the failure rate, unless other gaits outlast that of the start.
   std::vector<MeshEstimate> survival;
+  MeshEstimate later_rate;
   double cheapest_failure = 0;
   NoiseFreeOrbit orbit;  ///< of a gait that comes back after several revolutions, over all of them
   int period = 1;        ///< revolutions after which the gait comes back; 0: there is none, `orbit` has no eigenvalues
@@ -87,7 +90,8 @@ inline MeshEstimate steps_from_quasi_stationary(const MeshStudy& study) {
 
 /// Returns the share that walks on after so many steps.
 inline MeshEstimate survival_after(const MeshStudy& study, std::uint64_t steps) {
-  return survival_after(study.survival, study.failure_rate, steps, study.frames.size());
+  const std::size_t turn = study.period > 0 ? study.orbit.frames.size() : study.frames.size();
+  return survival_after(study.survival, study.later_rate, steps, std::max<std::size_t>(1, turn));
 }
 
 /// Returns the spacing of the scores that a study's meshes take.

@@ -73,8 +73,8 @@ void require_readable(const analysis::ExperimentSource& source) {
     analysis::parse_experiment(source);
   } catch (const analysis::InputError& error) {
     throw std::runtime_error(
-        fmt::format("nothing was written: an experiment folder holds wheels that roll from leg to "
-                    "leg, as these do not ({}): a flatter slope or slower launches do",
+        fmt::format("nothing was written: no reader of experiment folders takes these trials ({}); where a wheel flies "
+                    "over a leg, a flatter slope or slower launches do",
                     error.lines().front()));
   }
 }

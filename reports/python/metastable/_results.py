@@ -297,9 +297,10 @@ class WalkerStudy(Result):
 
     # Where there is a gait to tell of; where it was asked for; where splitting stands beside a mesh, or no mesh beside it.
     gait = how_it_fails = splitting = no_mesh = None
-    # By splitting: the intervals of `survival`, NaN where they are not known, survival after steps beyond, and what the
-    # rounds took.
-    survival_interval_95 = survival_after = None
+    # The intervals of `survival` are NaN where they are not known.
+    survival_interval_95 = None
+    # By splitting: survival after steps beyond, and what the rounds took.
+    survival_after = None
     method = rounds = steps_of_a_round = rates_of_rounds = split_by = lines_to_failure = steps_of_the_map = None
     # Of a mesh.
     relative_errors = guided_sampling = direct_simulation = no_guided_sampling = no_direct_simulation = None

@@ -46,14 +46,15 @@ TEST(DiagnosisSentences, SayWhatStandsInThePlaceOfTheUnnamed) {
   const auto stays = [&] {
     std::string said;
     for (const std::string& sentence : sentences(d))
-      if (sentence.find("without a name") < 20 || sentence.starts_with("In its place")) said += sentence;
+      if (sentence.find("without a name") < 20 || sentence.starts_with("The likeliest model has")) said += sentence;
     return said;
   };
   EXPECT_EQ(stays(), "Something without a name stays, 11 % of the gap, with probability 0.93.");
   d.causes.stand_ins = {"contact_memory", "trial_spread"};
   EXPECT_EQ(stays(),
             "Something without a name is at work, too, 11 % of the gap, with probability 0.93."
-            "In its place the best model has contact_memory and trial_spread, too unlikely to be named.");
+            "The likeliest model has contact_memory and trial_spread in the place of what has no name, too unlikely to "
+            "be named.");
 }
 
 std::string next_for(std::size_t trials, std::size_t steps, const std::string& step_name) {

@@ -147,5 +147,20 @@ TEST_F(PlausibilityTest, TakesSimulatedTrialsThatAreAlike) {
   EXPECT_TRUE(refused(simulate_trials(setting_, {.trials = 30, .collisions = 3, .seed = 3})).empty());
 }
 
+TEST_F(PlausibilityTest, TimesOfOneConditionMayBeInAnotherUnit) {
+  std::vector<dynamics::Trial> late = simulate_trials(setting_, {.trials = 6, .seed = 4});
+  for (dynamics::Trial& trial : late)
+    for (dynamics::TrialCollision& c : trial.collisions) c.time *= 1000;
+  try {
+    parse_experiment(
+        source_of(experiment_files({{"early", setting_, trials_}, {"late", setting_, late}}, "t", {}), ""));
+    ADD_FAILURE() << "Times in milliseconds were taken.";
+  } catch (const InputError& error) {
+    const std::string line = error.lines().front();
+    EXPECT_NE(line.find("of condition 'late'"), std::string::npos) << line;
+    EXPECT_NE(line.find("milliseconds are suspected"), std::string::npos) << line;
+  }
+}
+
 }  // namespace
 }  // namespace metastable::analysis

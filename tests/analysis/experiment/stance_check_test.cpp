@@ -128,6 +128,55 @@ TEST(StanceCheck, AsksAboutSpeedsAndTimesThatContradictEachOther) {
   EXPECT_EQ(question(spoilt([](Rows& rows) { scale(rows, 1.05, 1 / 1.05); })), "");
 }
 
+// The paper's three conditions in the virtual laboratory, with some trials each.
+Experiment three_conditions(dynamics::Law law, int trials) {
+  Setting setting = stand_in_setting();
+  setting.law = law;
+  if (law == dynamics::Law::settled) {
+    setting.restitution = {0.4, 0.05};
+    setting.friction = {0.4, 0.03};
+    setting.wheel.radius_of_gyration = 0.0424;
+  }
+  std::vector<LaboratoryCondition> conditions = stand_in_conditions(setting);
+  for (LaboratoryCondition& one : conditions) one.trials = trials;
+  const dynamics::LaboratorySetup setup = laboratory_setup(conditions, {.sensor_noise = 0.003, .seed = 3});
+  const ExperimentFiles files = laboratory_files(conditions, setup, run_laboratory(setup, 0), {}).files;
+  return parse_experiment({"lab", files.experiment_toml, files.collisions_csv, files.trials_csv, {}});
+}
+
+Experiment scaled(Experiment experiment, std::size_t condition, double speeds, double times) {
+  for (MeasuredTrial& trial : experiment.trials)
+    if (trial.condition == condition) scale(trial.collisions, speeds, times);
+  return experiment;
+}
+
+// What one condition has wrong is not to be seen in the middle of all.
+TEST(StanceCheck, JudgesConditionsByThemselves) {
+  for (const dynamics::Law law : {dynamics::Law::published, dynamics::Law::settled}) {
+    const Experiment right = three_conditions(law, 8);
+    EXPECT_EQ(refusal(right), "");
+    EXPECT_EQ(question(right), "");
+    for (std::size_t c = 0; c < right.conditions.size(); ++c) {
+      const std::string id = "'" + right.conditions[c].id + "'";
+      const std::string doubled = refusal(scaled(right, c, 2, 0.5));
+      EXPECT_NE(doubled.find("half of the stances of condition " + id), std::string::npos) << doubled;
+      const std::string asked = question(scaled(right, c, 1.05, 1));
+      EXPECT_NE(asked.find("contradict each other"), std::string::npos) << id;
+      EXPECT_NE(asked.find("condition " + id), std::string::npos) << asked;
+    }
+    EXPECT_NE(question(scaled(right, 2, 0.95, 1)).find("contradict each other"), std::string::npos);
+  }
+}
+
+TEST(StanceCheck, JudgesTrialsByThemselves) {
+  for (const dynamics::Law law : {dynamics::Law::published, dynamics::Law::settled})
+    for (const std::size_t from : {4u, 8u}) {
+      Experiment changed = three_conditions(law, 12);
+      for (std::size_t t = from; t < 12; ++t) scale(changed.trials[t].collisions, 1.05, 1);
+      EXPECT_NE(question(changed).find("contradict each other"), std::string::npos) << from;
+    }
+}
+
 TEST(StanceCheck, AsksAboutClocksThatJump) {
   Experiment experiment = rolled(dynamics::Law::published);
   for (std::size_t k = 4; k < experiment.trials[2].collisions.size(); ++k)

@@ -162,6 +162,8 @@ TEST(Machine, UnitsAreThoseThatNamesEndIn) {
                                    {"swing_rad", "rad"},
                                    {"loss_n_m", "N m"},
                                    {"per_rad", "1/rad"},
+                                   {"drag_n_m_s2", "N m s^2"},
+                                   {"friction_per_m", "1/m"},
                                    {"slope_deg", "deg"},
                                    {"decay", ""},
                                    {"gains", ""},

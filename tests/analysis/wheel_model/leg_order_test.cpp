@@ -7,6 +7,8 @@
 #include <string>
 
 #include "analysis/experiment/experiment_folder.h"
+#include "analysis/experiment/laboratory_experiment.h"
+#include "analysis/experiment/stand_in.h"
 #include "tests/analysis/settings.h"
 
 namespace metastable::analysis {
@@ -83,6 +85,43 @@ TEST(LegOrder, IsNotAskedAboutWhereALegIsLonger) {
       e.wheel.leg_length[leg] += by;
       EXPECT_EQ(asked(e), "") << leg << ' ' << by;
     }
+}
+
+// Trials of a wheel whose feet hop, in the virtual laboratory; some landings are too fast to be judged.
+Experiment hopping_wheel() {
+  Setting setting = stand_in_setting();
+  setting.law = dynamics::Law::settled;
+  setting.restitution = {0.4, 0.05};
+  setting.friction = {0.4, 0.03};
+  setting.wheel.radius_of_gyration = 0.0424;
+  std::vector<LaboratoryCondition> conditions = stand_in_conditions(setting);
+  conditions.resize(1);
+  conditions[0].trials = 16;
+  const dynamics::LaboratorySetup setup = laboratory_setup(conditions, {.sensor_noise = 0.003, .seed = 3});
+  return experiment_of(conditions, setup, run_laboratory(setup, 0), {});
+}
+
+// The effects leg_lengths and, of columns a row off, leg_contact were named, or nothing was.
+TEST(LegOrder, IsJudgedByHowLandingsGoOnUnderSettled) {
+  const Experiment e = hopping_wheel();
+  const WheelRuns right = wheel_runs(e);
+  for (const std::string& note : right.notes) EXPECT_FALSE(note.ends_with('?')) << note;
+  const auto turned = [&](std::size_t trials, int by) {
+    WheelRuns runs = right;
+    for (std::size_t t = 0; t < trials; ++t)
+      for (RunCollision& m : runs.runs[t].collisions) m.context.leg = (m.context.leg + by) % 8;
+    return question_on_leg_order(runs, e).value_or("");
+  };
+  EXPECT_NE(turned(16, 1).find("leg 0 has length 7 of that list (counted from 0), leg 1 length 0"), std::string::npos);
+  EXPECT_NE(turned(16, 7).find("leg 0 has length 1 of that list (counted from 0), leg 1 length 2"), std::string::npos);
+  EXPECT_NE(turned(5, 1).find(" of 16 trials, the first of them trial "), std::string::npos) << turned(5, 1);
+  WheelRuns late = right, early = right;
+  for (WheelRun& run : late.runs)
+    for (std::size_t k = run.collisions.size() - 1; k > 0; --k) run.collisions[k].after = run.collisions[k - 1].after;
+  for (WheelRun& run : early.runs)
+    for (std::size_t k = 0; k + 1 < run.collisions.size(); ++k) run.collisions[k].after = run.collisions[k + 1].after;
+  EXPECT_TRUE(question_on_rows(late).value_or("").ends_with("does the column stand a row late?"));
+  EXPECT_TRUE(question_on_rows(early).value_or("").ends_with("does the column stand a row early?"));
 }
 
 }  // namespace

@@ -42,5 +42,15 @@ TEST(FailureCount, TellsBothFigures) {
             "1 of 4 simulated walks failed within 1000 steps, where the mesh foretells 0.004");
 }
 
+TEST(SurvivalAfter, GoesOnByRevolutions) {
+  const std::vector<MeshEstimate> survival{{0.9, 0.9, 0.9}, {0.5, 0.5, 0.5}, {0.45, 0.45, 0.45}};
+  const MeshEstimate half{0.5, 0.5, 0.5}, never{1, 1, 1};
+  EXPECT_EQ(survival_after(survival, half, 0, 2).value, 1);
+  EXPECT_EQ(survival_after(survival, never, 3, 2).value, 0.45);
+  EXPECT_NEAR(survival_after(survival, half, 4, 2).value, 0.5 * 0.25, 1e-15);
+  EXPECT_NEAR(survival_after(survival, half, 5, 2).value, 0.45 * 0.25, 1e-15);
+  EXPECT_EQ(survival_after(survival, never, 4, 2).value, 0);
+}
+
 }  // namespace
 }  // namespace metastable::markov

@@ -112,7 +112,7 @@ TEST(MeshStudy, PhasesAgreeWithSimulation) {
 
 TEST(MeshStudy, SharesThatWalkOnAreThoseOfSimulationAndAddUpToTheSteps) {
   const std::vector<double> start{2};
-  for (const BatchMap& map : {linear_batch(1.2), two_phase_batch(1.2)}) {
+  for (const BatchMap& map : {linear_batch(1.2), two_phase_batch(1.2), cubic_batch(0.4)}) {
     const MeshStudy study = mesh_study(map, start, {.guided_samples = 0, .simulated_steps = 0});
     double sum = 0;
     for (std::uint64_t n = 0; n < 5000; ++n) sum += survival_after(study, n).value;

@@ -63,9 +63,11 @@ TEST_F(DiagnoseCommand, SaysTheStepsOfAnotherPlace) {
   EXPECT_EQ(machine[0].at("where"), "as measured");
   EXPECT_EQ(machine[1].at("where"), "on a slope of 8 deg and with launches at 5 rad/s");
   EXPECT_LT(machine[1].at("interval_90")[0], machine[1].at("interval_90")[1]);
-  EXPECT_NE(asked({"--at-slope", "30"}).err.find("metastable: --at-slope: 30 is outside [0.001, 22.5) deg\n"), std::string::npos)
+  EXPECT_NE(asked({"--at-slope", "30"}).err.find("metastable: --at-slope: 30 is outside [0.001, 22.5) deg\n"),
+            std::string::npos)
       << asked({"--at-slope", "30"}).err;
-  EXPECT_NE(asked({"--at-speed", "0"}).err.find("metastable: --at-speed: 0 is outside (0, 1000] rad/s\n"), std::string::npos)
+  EXPECT_NE(asked({"--at-speed", "0"}).err.find("metastable: --at-speed: 0 is outside (0, 1000] rad/s\n"),
+            std::string::npos)
       << asked({"--at-speed", "0"}).err;
   EXPECT_EQ(asked({"--at-speed", "0"}).code, 2);
 }

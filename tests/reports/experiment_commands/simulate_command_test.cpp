@@ -41,7 +41,7 @@ TEST_F(SimulateCommand, WheelsThatFlyOverALegAreNotWritten) {
     if (reality) words.emplace_back("--reality");
     const Ran ran = metastable(words);
     EXPECT_EQ(ran.code, 3);
-    EXPECT_NE(ran.err.find("nothing was written: an experiment folder holds wheels that roll from leg to leg"),
+    EXPECT_NE(ran.err.find("nothing was written: no reader of experiment folders takes these trials"),
               std::string::npos)
         << ran.err;
     EXPECT_FALSE(std::filesystem::exists(folder_ / "t"));
