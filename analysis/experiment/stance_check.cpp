@@ -40,7 +40,7 @@ constexpr double time_room = 0.03, most_scatter = 0.1, too_long = 1.6;
 constexpr double room_between_ramps = 0.04, room_a_degree = 0.02, most_scatter_of_hops = 0.06;
 // Median shares of trials fall into two groups if these lie so many of the deviations within them apart. Of 70
 // conditions of those recordings none came to more than 4.2; where half of the trials are 5 % off it is 12.
-// Of fewer than ten trials of one machine some fall so far apart by chance, 1 in 100 of eight and 1 in 1000 of 16.
+// Trials of one machine fall so far apart by chance in 1 of 100 folders of eight, and in 1 of 1000 of 16.
 constexpr std::size_t stances_of_a_trial = 8, least_trials = 3, fewest_trials = 10;
 constexpr double clearly_apart = 6;
 // Steps are in distances between feet; sliding feet reach beyond both.

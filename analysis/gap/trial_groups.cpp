@@ -25,9 +25,10 @@ constexpr int split_draws = 2000;    // for the chance level of one split
 constexpr int counted_draws = 60;    // beyond which its tail follows an exponential law
 constexpr double poor_share = 0.1;   // of the usual information of a step: a trial says next to nothing
 constexpr double most_poor = 0.1;    // Trials that say so little may hold this share of the steps.
-// What changes the spread of scores gains or loses by nearly every step, whatever moves their mean by some alone. Where
-// one machine of two is far off the model it outweighs the other: those trials that fit best are asked by themselves.
-constexpr double one_sided = 0.8;
+// Nearly all steps gain, or nearly all lose, by a parameter that changes the spread of scores; some gain and others
+// lose by one that moves their mean. One machine of two that is far off the model outweighs the other, so that the
+// trials that fit best are asked by themselves, too.
+constexpr double one_sided = 0.8;        // Such a share of all gains and losses goes one way.
 constexpr std::size_t best_fitting = 5;  // The best fitting trials are one of so many.
 constexpr double least_apart = 3;        // sds of a trial: groups that overlap more are none
 constexpr std::size_t most_named = 5;    // trials in the sentence

@@ -103,7 +103,7 @@ class SettledMisses {
     }
     as_noted_ = typical_nexts({});
   }
-  // Where wild landings are bounded, trials whose legs are other ones than most trials' are bounded too.
+  // Bounds of wild landings also bound trials whose legs are other ones than most trials'.
   Misses in(const LegOrder& order, bool bounded) const {
     const auto nexts = typical_nexts(order);
     Misses all(noted_.size());

@@ -150,7 +150,7 @@ Experiment scaled(Experiment experiment, std::size_t condition, double speeds, d
   return experiment;
 }
 
-// What one condition has wrong is not to be seen in the middle of all.
+// The middle of all rows does not show what one condition has wrong.
 TEST(StanceCheck, JudgesConditionsByThemselves) {
   for (const dynamics::Law law : {dynamics::Law::published, dynamics::Law::settled}) {
     const Experiment right = three_conditions(law, 8);

@@ -110,7 +110,7 @@ TEST(TrialGroups, ABreakIsHeldAgainstADrift) {
   EXPECT_FALSE(broken({step.begin(), step.begin() + 8})) << "too few";
 }
 
-// Of parameters that are known, all trials of the other machine differ one way, and by many sds of a sharp sensor.
+// All trials of the other machine differ one way if the parameters are known, and by many sds of a sharp sensor.
 TEST(TrialGroups, AreSaidWhereTheOtherMachineAloneDiffersFromTheModel) {
   Machine machine = linear_machine(0.002);
   for (MachineParameter& p : machine.parameters) p.sd = 0;

@@ -98,7 +98,7 @@ struct TwoWells {
   double leap = 4.5;
 };
 
-// What is left of the launches after 100,000 steps is no number of those that never rest.
+// The launches that are left after 100,000 steps are not those that never rest.
 TEST(RestReachability, LaunchesThatRestLateBesideOthersThatNeverDoHaveNoNumber) {
   const auto from_slow = [](double leap) {
     const Problem problem{TwoWells{leap}, {[](double) { return 0.5; }, 0}};

@@ -42,7 +42,7 @@ TEST_F(Refusals, OfWheelsThatSettledDoesNotHold) {
   });
 }
 
-// Of a folder of walks it is known only once they are read which effects there are.
+// Folders of walks show only once they are read which effects there are.
 TEST_F(Refusals, NameTheOptionWhoseValueTheDiagnosisDoesNotKnow) {
   const std::string walks = path("walks");
   ASSERT_EQ(metastable({"simulate", "--walker", "simplest", "--slope-sd", "0.05", "--trials", "2", "--collisions", "4",

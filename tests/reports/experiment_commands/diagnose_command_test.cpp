@@ -134,7 +134,7 @@ TEST_F(DiagnoseCommand, SaysWhichEffectsTheModelCannotHave) {
   const Ran none = metastable({"diagnose", path("wheel"), "--catalogue", "soft_contact"});
   EXPECT_EQ(none.code, 2);
   EXPECT_EQ(none.err,
-            "metastable: catalogue: these data under this law can show none of soft_contact; soft_contact: no impact "
+            "metastable: --catalogue: these data under this law can show none of soft_contact; soft_contact: no impact "
             "lasts but under `settled`\n");
 }
 
