@@ -20,18 +20,18 @@ namespace metastable::analysis {
 namespace {
 
 constexpr std::size_t fewest_in_group = 3;
-constexpr double least_share = 0.1;  // of the trials, in the smaller group
+constexpr double least_share = 0.1;  // The smaller group holds this share of the trials.
 constexpr int split_draws = 2000;    // for the chance level of one split
 constexpr int counted_draws = 60;    // beyond which its tail follows an exponential law
-constexpr double poor_share = 0.1;   // of the usual information of a step: a trial says next to nothing
+constexpr double poor_share = 0.1;   // A trial says next to nothing with this share of a step's usual information.
 constexpr double most_poor = 0.1;    // Trials that say so little may hold this share of the steps.
 // Nearly all steps gain, or nearly all lose, by a parameter that changes the spread of scores; some gain and others
 // lose by one that moves their mean. One machine of two that is far off the model outweighs the other, so that the
 // trials that fit best are asked by themselves, too.
 constexpr double one_sided = 0.8;        // Such a share of all gains and losses goes one way.
 constexpr std::size_t best_fitting = 5;  // The best fitting trials are one of so many.
-constexpr double least_apart = 3;        // sds of a trial: groups that overlap more are none
-constexpr std::size_t most_named = 5;    // trials in the sentence
+constexpr double least_apart = 3;        // Groups that lie fewer sds of a trial apart are none.
+constexpr std::size_t most_named = 5;    // The sentence names so many trials.
 constexpr double least_weight = 1e-12;
 constexpr int drift_degree = 3;                 // of a polynomial that a break is held against
 constexpr std::size_t fewest_for_a_break = 12;  // trials

@@ -27,7 +27,7 @@ std::string label_objection(const std::vector<std::string>& labels, const StepCo
 
 /// Checks names and types of the columns, steps of a trial in order without gap, legs that take turns, trials that
 /// stand together, and outcomes of those trials only. Values of labels and phases have the order in which they come.
-/// What is wrong goes to `defects`, each with file, line and column.
+/// Each defect goes to `defects`, with file, line and column.
 /// @param source  with the texts of both files; trials.csv may be missing
 void read_steps(const ExperimentSource& source, const StepColumns& columns, MachineRuns& runs, Defects& defects);
 

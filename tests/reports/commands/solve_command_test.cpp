@@ -39,7 +39,7 @@ TEST_F(SolveCommand, SaysTheValueOrThatItIsOutOfReach) {
   EXPECT_EQ(none.out.find("rigid bodies"), std::string::npos);
 }
 
-// What is solved for has no value yet.
+// The parameter that is solved for has no value yet.
 TEST(SolveAnswerText, IsHeadedByWhatDoesNotVaryOfAWalker) {
   SolveRequest request;
   request.walker = analysis::WalkerSetting{analysis::Walker::simplest, 0.5, 0.25, dynamics::Terrain::fresh};
