@@ -9,6 +9,7 @@
 #include <optional>
 #include <set>
 #include <stdexcept>
+#include <string_view>
 #include <tuple>
 #include <utility>
 
@@ -371,6 +372,7 @@ struct Decided {
   const Fit* cause;  // of the best hypothesis, or the recalibrated model
   HeldOutGap held_out;
   const Variation* same = nullptr;     // Chosen::same
+  std::optional<EvenPush> push = {};   // It is held against the best hypothesis.
   std::optional<FitsWithout> without;  // of the best hypothesis; nothing where it is the recalibrated model
 };
 Decided decide(const TransitionModel& model, const Fitted& fitted, const std::vector<const Candidate*>& candidates,
@@ -393,6 +395,10 @@ Decided decide(const TransitionModel& model, const Fitted& fitted, const std::ve
     chosen.same = same_variation(model, *decided.ranked.best(), chosen.supposed.front().facets, options.rules);
     if (chosen.same) chosen.unnamed.alone = 0;  // What varies so has the name.
     decided.same = chosen.same;
+    // An effect outside the catalogue that pushes all steps alike may pass for a name that can do less of it.
+    decided.push = fitted_even_push(model, fitted.recalibrated, *decided.ranked.best(), options.rules, options.threads);
+    if (!chosen.same && decided.push && decided.push->instead(options.rules))
+      chosen.unnamed.alone = std::max(chosen.unnamed.alone, options.rules.certain_odds);
     decided.without.emplace(model, fitted.ranking, *decided.ranked.best(), fitted.recalibrated);
   }
   if (const std::optional<TrialGroups> two =
@@ -426,6 +432,34 @@ void doubt_effects(Diagnosis& d, const std::vector<const Candidate*>& candidates
   d.causes.at_work = std::move(named.at_work);
 }
 
+// Puts a question about the data themselves, as of their unit, behind what is made of them, and behind other questions.
+void say_question(Diagnosis& d, const std::string& question) {
+  constexpr std::string_view opening = "But a question comes first: ";
+  const bool named = d.verdict == Verdict::explained || d.verdict == Verdict::partly_explained;
+  auto behind = std::min(d.sentences.size(), std::size_t{named ? 2U : 1U});
+  while (behind < d.sentences.size() && d.sentences[behind].starts_with(opening)) ++behind;
+  d.sentences.insert(d.sentences.begin() + static_cast<std::ptrdiff_t>(behind), std::string(opening) + question);
+}
+
+// Says what steps the machine and its models take; those that were counted alone, where the models have none to tell.
+void add_steps(Diagnosis& d, const TransitionModel& model, const Fitted& fitted, const Fit& cause,
+               const std::vector<const RankedCause*>& ordered, const Elsewhere& elsewhere,
+               const DiagnosisOptions& options, const Progress& progress) {
+  if (const std::string why = model.steps_not_told(); !why.empty()) {
+    d.data.notes.push_back(why);
+    add_counted_steps(d.shrinkage.steps, model.rests());
+    return;
+  }
+  d.shrinkage.steps = steps_before_failure(model, fitted.given.nuisance, fitted.recalibrated, cause, options.seed);
+  set_later_steps(d.shrinkage.steps, model, cause);
+  if (const auto [at_risk, rests] = model.rests(); at_risk > 0 && !d.shrinkage.measures.empty())
+    d.shrinkage.measures.push_back(rest_shrinkage(
+        at_risk, rests, d.shrinkage.steps,
+        fmt::format("share of {}s that {}, all trials", d.data.step_name, d.data.collides() ? "rest" : "fail")));
+  add_machine_steps(d, model, {&fitted.recalibrated, 1}, telling(ordered, fitted.recalibrated, cause, d), elsewhere,
+                    options, [&] { progress(0.9, "steps before failure"); });
+}
+
 // Puts the answer together from what each stage says.
 Diagnosis answer(const TransitionModel& model, const Fitted& fitted, Decided decided,
                  const std::vector<const Candidate*>& candidates, const Elsewhere& elsewhere,
@@ -443,18 +477,13 @@ Diagnosis answer(const TransitionModel& model, const Fitted& fitted, Decided dec
                         options, [&] { progress(0.86, "what has no name"); });
   }
 
-  if (best && (d.verdict == Verdict::explained || d.verdict == Verdict::partly_explained))
-    d.causes.even_push = decided.same ? same_push_in_words(*decided.same)
-                                      : even_push_in_words(model, fitted.recalibrated, *best, d.rules, options.threads);
+  const bool named = d.verdict == Verdict::explained || d.verdict == Verdict::partly_explained;
+  if (named && decided.same)
+    d.causes.even_push = same_push_in_words(*decided.same);
+  else if (decided.push && (named || (d.verdict == Verdict::unexplained && decided.push->instead(d.rules))))
+    d.causes.even_push = even_push_in_words(model, *decided.push, d.rules);
   progress(0.88, "steps before failure");
-  d.shrinkage.steps = steps_before_failure(model, fitted.given.nuisance, fitted.recalibrated, cause, options.seed);
-  set_later_steps(d.shrinkage.steps, model, cause);
-  if (const auto [at_risk, rests] = model.rests(); at_risk > 0 && !d.shrinkage.measures.empty())
-    d.shrinkage.measures.push_back(rest_shrinkage(
-        at_risk, rests, d.shrinkage.steps,
-        fmt::format("share of {}s that {}, all trials", d.data.step_name, d.data.collides() ? "rest" : "fail")));
-  add_machine_steps(d, model, {&fitted.recalibrated, 1}, telling(ordered, fitted.recalibrated, cause, d), elsewhere,
-                    options, [&] { progress(0.9, "steps before failure"); });
+  add_steps(d, model, fitted, cause, ordered, elsewhere, options, progress);
   d.shrinkage.profile = collision_profile(model, fitted.given.nuisance, cause, options.seed);
   if (is_gap(d.verdict)) d.shrinkage.drawn_with_effect = model.simulate(cause.nuisance, cause.terms, options.seed);
   progress(0.93, "what could not be seen");
@@ -467,17 +496,18 @@ Diagnosis answer(const TransitionModel& model, const Fitted& fitted, Decided dec
   d.sentences = sentences(d);
   if (d.verdict == Verdict::recalibrate)  // It stands behind the verdict.
     std::ranges::move(model.misstated(fitted.recalibrated), std::inserter(d.sentences, std::next(d.sentences.begin())));
-  // A question about the data themselves, as of their unit, stands behind what is made of them.
-  const bool named = d.verdict == Verdict::explained || d.verdict == Verdict::partly_explained;
-  auto behind =
-      d.sentences.begin() + static_cast<std::ptrdiff_t>(std::min<std::size_t>(d.sentences.size(), named ? 2 : 1));
   for (const std::string& note : d.data.notes)
-    if (note.ends_with('?')) behind = std::next(d.sentences.insert(behind, "But a question comes first: " + note));
+    if (note.ends_with('?')) say_question(d, note);
   for (const AtBound& one : d.limits.at_bound) d.sentences.push_back(at_bound_in_words(one, cause.terms));
   return std::move(d);
 }
 
 }  // namespace
+
+void ask_first(Diagnosis& d, const std::string& question) {
+  d.data.notes.push_back(question);
+  say_question(d, question);
+}
 
 std::string verdict_name(Verdict verdict) {
   switch (verdict) {

@@ -226,6 +226,10 @@ struct Diagnosis {
   } data;
 };
 
+/// Adds a question about the data, which ends in '?', to the notes of a diagnosis, and to its sentences behind the
+/// verdict and the questions that are there.
+void ask_first(Diagnosis& d, const std::string& question);
+
 /// Compares the trials with their nominal model and with every effect that the model knows: fits, chance levels,
 /// probabilities and a verdict. The same seed gives the same bits. Seconds to minutes: some hundred fits, each of many
 /// evaluations of all events.

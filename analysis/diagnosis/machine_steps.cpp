@@ -18,7 +18,7 @@ namespace metastable::analysis {
 namespace {
 
 // Draws of what stands for the machine, and of the recalibrated model: fewer save time.
-constexpr int draws_of_machine = 16, draws_of_recalibrated = 10;
+constexpr int draws_of_machine = 40, draws_of_recalibrated = 24;
 constexpr double of_no_say = 3;   // sd of the logarithm
 constexpr double few_steps = 20;  // Fewer later steps say nothing of how failures are spread along trials.
 // The grid of a model's error has so many nodes, out to so many sds on either side.
@@ -181,8 +181,15 @@ Estimate joined_steps(const std::vector<double>& here, const std::vector<double>
                       double at_risk, double rests) {
   if (here.empty() || here.size() != there.size())
     throw std::invalid_argument(fmt::format("joined_steps: {} draws here and {} there", here.size(), there.size()));
-  // A few draws stand for all: each is spread by the bandwidth of a normal kernel (Silverman's rule).
-  const double kernel = 1.06 * log_moments(here).sd * std::pow(static_cast<double>(here.size()), -0.2);
+  // A few draws stand for all: each is spread by a normal kernel (Silverman's rule), and drawn towards their mean, so
+  // that together they spread no more than without it (West 1993, J. R. Statist. Soc. B 55, 409).
+  const LogMoments drawn = log_moments(there);
+  const double share = std::min(1.0, 1.06 * std::pow(static_cast<double>(there.size()), -0.2)),
+               kernel = share * drawn.sd;
+  const auto towards_mean = [&](double steps) {
+    return std::isfinite(steps) ? std::exp(drawn.mean + std::sqrt(1 - share * share) * (std::log(steps) - drawn.mean))
+                                : steps;
+  };
   std::vector<std::pair<double, double>> weighed;
   for (std::size_t i = 0; i < here.size(); ++i) {
     if (!std::isfinite(here[i])) {  // such a machine has no rests
@@ -195,8 +202,9 @@ Estimate joined_steps(const std::vector<double>& here, const std::vector<double>
     for (int k = 0; k < error_nodes; ++k)
       for (const double more : {-1.0, 1.0})
         for (const double place : {-1.2247, 0.0, 1.2247})  // three equal weights of mean 0 and variance 1
-          weighed.emplace_back(there[i] * std::exp(error.here * error_at(k) + more * further + kernel * place),
-                               weight[static_cast<std::size_t>(k)] * error_nodes / 3);
+          weighed.emplace_back(
+              towards_mean(there[i]) * std::exp(error.here * error_at(k) + more * further + kernel * place),
+              weight[static_cast<std::size_t>(k)] * error_nodes / 3);
   }
   if (weighed.empty()) {  // every draw is refuted: the count alone is left
     StepsBeforeFailure counted;
@@ -251,6 +259,14 @@ void set_later_steps(StepsBeforeFailure& steps, const TransitionModel& model, co
   if (later < few_steps || !(failures > 0)) return;
   steps.later = later_failures > 0 ? later / later_failures : infinite;
   steps.later_times = steps.later * failures / all;
+}
+
+void add_counted_steps(StepsBeforeFailure& steps, std::pair<double, double> rests) {
+  set_observed(steps, rests);
+  if (rests.second > 0)
+    steps.machine.push_back({"", {steps.observed, steps.observed_lower, steps.observed_upper}, false});
+  else if (rests.first > 0)
+    steps.machine.push_back(survivors_steps("", infinite, steps, false));
 }
 
 void add_machine_steps(Diagnosis& d, const TransitionModel& model, const WeighedFit& recalibrated,

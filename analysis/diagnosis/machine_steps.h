@@ -74,6 +74,10 @@ MachineSteps survivors_steps(const std::string& where, double model_lower, const
 /// later half. They stay 0 where outcomes are not known, and where too few steps are later ones.
 void set_later_steps(StepsBeforeFailure& steps, const TransitionModel& model, const Fit& fit);
 
+/// Fills in what was counted, and the machine's steps by that alone.
+/// @param rests  TransitionModel::rests()
+void add_counted_steps(StepsBeforeFailure& steps, std::pair<double, double> rests);
+
 /// Fills in the intervals of the models' expected steps, and the machine's own; none where neither the models nor the
 /// count bound them.
 /// @param fits  the models that may be the machine, by their probabilities (none: the recalibrated model alone)

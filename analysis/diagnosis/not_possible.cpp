@@ -102,8 +102,8 @@ std::vector<NotPossible> not_possible(const TransitionModel& model, const Diagno
     all.push_back({"the observed steps before failure but for their lower end",
                    known ? fmt::format("no trial {} in {:.0f} {}s; the model expects one in {:.3g}", ended, at_risk,
                                        d.data.step_name, steps)
-                         : fmt::format("no trial {} in {:.0f} {}s, and none of those that the model draws", ended,
-                                       at_risk, d.data.step_name),
+                         : fmt::format("no trial {} in {:.0f} {}s{}", ended, at_risk, d.data.step_name,
+                                       std::isinf(steps) ? ", and none of those that the model draws" : ""),
                    known ? whole(std::log1p(-surely) / (each * std::log1p(-1 / steps))) : std::nullopt});
   }
   return all;

@@ -262,6 +262,8 @@ class TransitionModel {
   /// measured ones, with launches like theirs: infinity where it never rests.
   virtual double expected_steps(std::span<const double> nuisance, std::span<const EffectTerm> terms,
                                 std::uint64_t seed) const = 0;
+  /// Says in a sentence why expected_steps() are not the machine's; "" where they are.
+  virtual std::string steps_not_told() const { return ""; }
   /// Holds what the recalibrated model draws against the densities that it gives. The default does nothing.
   /// @throws std::runtime_error  where the two differ by so much that effects would be named which are not there
   virtual void require_own_draws(const Fit& recalibrated) const;

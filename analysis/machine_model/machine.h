@@ -89,7 +89,7 @@ struct Machine {
   /// A call of `step` costs much more than a row, as where an interpreter runs it.
   bool dear = false;
   double most_wild = 0.01;  ///< largest share of rows that may be wild (missed events, bad tracks), [0, 0.2]
-  std::map<std::string, std::string> units;  ///< States and values have these where their names do not end in them.
+  std::map<std::string, std::string> units;  ///< Stated of states, values and inputs; names may tell theirs.
 
   /// Returns the unit of a state or value: the one stated, else the one that its name ends in ("swing_rad_s": rad/s;
   /// "per_m": 1/m); "" where there is none.

@@ -136,6 +136,16 @@ std::size_t jumps_by(const MachineRuns& runs, std::size_t sensor, double turn) {
   return span > least_span * turn && span < within_turn * turn && jumps >= jumps_to_moves * moves ? jumps : 0;
 }
 
+bool same(const MachineTrial& a, const MachineTrial& b) {
+  if (a.rows.size() != b.rows.size() || a.rows.size() < 3) return false;
+  for (std::size_t k = 0; k < a.rows.size(); ++k)
+    for (std::size_t j = 0; j < a.rows[k].seen.size(); ++j) {
+      const double x = a.rows[k].seen[j], y = b.rows[k].seen[j];
+      if (!(x == y) && !(std::isnan(x) && std::isnan(y))) return false;
+    }
+  return true;
+}
+
 }  // namespace
 
 std::vector<std::string> wrapping_columns(const Machine& machine, const MachineRuns& runs) {
@@ -197,6 +207,31 @@ MachineDesign machine_design(const Machine& machine, const MachineRuns& runs) {
     }
   measure_inputs(design, machine, runs);
   return design;
+}
+
+std::string replayed_inputs(const Machine& machine, const MachineDesign& design) {
+  for (std::size_t i = 0; i < machine.inputs.size(); ++i)
+    if (design.inputs[i].changes && !design.inputs[i].by_phase)
+      return fmt::format(
+          "no model tells the expected steps: {} was recorded and changes within trials; a simulation would replay it "
+          "as it was, whatever the state, and a machine that is held by feedback would fail in it",
+          machine.inputs[i]);
+  return "";
+}
+
+std::vector<std::string> doubled_trials(const MachineRuns& runs) {
+  std::multimap<double, std::size_t> by_first;
+  std::size_t doubled = 0;
+  for (std::size_t t = 0; t < runs.trials.size(); ++t) {
+    if (runs.trials[t].rows.empty() || runs.trials[t].rows[0].seen.empty()) continue;
+    const double first = runs.trials[t].rows[0].seen[0];
+    const auto [from, to] = by_first.equal_range(first);
+    doubled += std::any_of(from, to, [&](const auto& at) { return same(runs.trials[at.second], runs.trials[t]); });
+    by_first.emplace(first, t);
+  }
+  if (doubled == 0) return {};
+  return {fmt::format("{} of {} trials are there twice, number by number: was one set of data brought in twice?",
+                      doubled, runs.trials.size())};
 }
 
 }  // namespace metastable::analysis

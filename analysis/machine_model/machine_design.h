@@ -57,6 +57,14 @@ struct MachineDesign {
 
 MachineDesign machine_design(const Machine& machine, const MachineRuns& runs);
 
+/// Says in a sentence why a machine whose inputs were recorded tells no expected steps, "" where no input changes
+/// within a trial but by the phase: a simulation would replay the inputs, which a machine that is held by feedback does
+/// not.
+std::string replayed_inputs(const Machine& machine, const MachineDesign& design);
+
+/// Asks, in a sentence, about trials that are there twice, number by number. Empty: there are none.
+std::vector<std::string> doubled_trials(const MachineRuns& runs);
+
 /// Asks, in a sentence each, about sensors whose values seem to wrap: they stay within a turn (2 pi, or 360) and jump
 /// by about one from row to row. Slopes of the map across such a jump are wrong.
 std::vector<std::string> wrapping_columns(const Machine& machine, const MachineRuns& runs);

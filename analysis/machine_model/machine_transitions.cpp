@@ -156,6 +156,7 @@ class MachineTransitions : public TransitionModel {
   const std::vector<Candidate>& candidates() const override { return candidates_; }
   const std::vector<Variation>& variations() const override { return variations_; }
   const Candidate* even_push() const override { return &push_.variation.candidate; }
+  std::string steps_not_told() const override { return replayed_inputs(*machine_, *design_); }
   bool refits_noise() const override {
     return std::ranges::any_of(machine_->observe, [](const MachineSensor& s) { return !s.sd; });
   }
@@ -515,12 +516,7 @@ void MachineTransitions::require_own_draws(const Fit& recalibrated) const {
   if (apart < rules.own_draws_apart || apart * std::sqrt(measured) < rules.own_draws_shown ||
       apart * std::sqrt(count) < rules.own_draws_by_chance)
     return;
-  throw std::runtime_error(fmt::format(
-      "step: rows that it draws itself are not distributed as its likelihood says (distribution functions "
-      "differ by {:.2g}, {:.2g} is allowed), so that effects would be named that are not there. A step that "
-      "jumps, folds, saturates or has a kink in its noise does that: each noise has to move the next state smoothly "
-      "and one way",
-      apart, rules.own_draws_apart));
+  throw OwnDrawsDiffer(apart, rules.own_draws_apart);
 }
 
 // Lists the suspected effects, with their sizes, with which the runs are about as likely while all parameters stay near
@@ -580,6 +576,15 @@ std::vector<std::string> MachineTransitions::misstated(const Fit& recalibrated) 
 }
 
 }  // namespace
+
+OwnDrawsDiffer::OwnDrawsDiffer(double apart_, double allowed_)
+    : std::runtime_error(fmt::format(
+          "step: rows that it draws itself are not distributed as its likelihood says (distribution functions differ "
+          "by {:.2g}, {:.2g} is allowed), so that effects would be named that are not there. A step that jumps, folds, "
+          "saturates or has a kink in its noise does that: each noise has to move the next state smoothly and one way",
+          apart_, allowed_)),
+      apart(apart_),
+      allowed(allowed_) {}
 
 std::unique_ptr<TransitionModel> machine_as_stated(std::shared_ptr<const Machine> machine, MachineRuns runs) {
   return std::make_unique<MachineTransitions>(refusing_nan(std::move(machine)), std::move(runs));

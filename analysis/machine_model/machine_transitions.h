@@ -40,6 +40,7 @@
 //   explained: dry_friction
 
 #include <memory>
+#include <stdexcept>
 #include <string>
 #include <vector>
 
@@ -48,6 +49,15 @@
 #include "analysis/machine_model/machine_runs.h"
 
 namespace metastable::analysis {
+
+/// Says that rows drawn from a machine are not distributed as its likelihood says, which
+/// TransitionModel::require_own_draws() refuses. Its sentence is for a user who wrote the step.
+class OwnDrawsDiffer : public std::runtime_error {
+ public:
+  /// @param apart  Kolmogorov's distance between the distribution functions  @param allowed  the largest
+  OwnDrawsDiffer(double apart, double allowed);
+  double apart, allowed;
+};
 
 /// Returns the transition model of a machine and its runs. A recalibration refits the parameters whose sd is above 0,
 /// the errors of sensors whose sd is not stated, and the share of wild rows. Effects are those of machine_effects().

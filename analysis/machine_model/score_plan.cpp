@@ -149,7 +149,7 @@ ScorePlan score_plan(const Machine& machine, const MachineRuns& runs, const Mach
     last_lost = i;
   }
   if (2 * lost > went_on)
-    throw std::invalid_argument(
+    throw FailsFromMostRows(
         fmt::format("step: fails without noise from {} of {} rows that went on, as from trial {}, "
                     "row {}",
                     lost, went_on, runs.name_of(places[last_lost].trial), places[last_lost].row + 1));

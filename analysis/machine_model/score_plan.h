@@ -3,6 +3,7 @@
 
 #include <cstddef>
 #include <optional>
+#include <stdexcept>
 #include <vector>
 
 #include "analysis/machine_model/machine.h"
@@ -19,11 +20,17 @@ struct ScorePlan {
   bool others_fail = false;  ///< scores that are taken as straight lead to failure, too
 };
 
+/// Says that the map fails at zero scores from most rows that went on.
+class FailsFromMostRows : public std::invalid_argument {
+ public:
+  using std::invalid_argument::invalid_argument;
+};
+
 /// Finds out where the map bends by more than one part in a thousand of its slope, at every measured row, and whether
 /// it fails within four and a half sds of its scores or did fail.
 /// @param nominal  without spreads and memory: a measured row is all of a point
 /// @throws std::invalid_argument for a hypothesis with these, where the map returns no finite state from a measured
-///   row, and where it fails at zero scores from most rows that went on
+///   row  @throws FailsFromMostRows where it fails from most of them
 ScorePlan score_plan(const Machine& machine, const MachineRuns& runs, const MachineHypothesis& nominal);
 
 }  // namespace metastable::analysis

@@ -104,6 +104,14 @@ class Kept {
   std::map<double, Metastability> studies_;
 };
 
+// Says what a user may do where the chain of a setting could not be solved.
+std::string not_solved(const markov::ConvergenceError& error, const StudyOptions& options) {
+  return fmt::format(
+      "its chain could not be solved ({}): try --method {}, other --cells, or --from and --to that leave "
+      "it out",
+      error.what(), options.method == Method::integrated ? "sampled" : "integrated");
+}
+
 Answered answer_at(const Setting& setting, double value, const Target& target, const StudyOptions& options,
                    Kept& kept) {
   try {
@@ -114,11 +122,24 @@ Answered answer_at(const Setting& setting, double value, const Target& target, c
   } catch (const NoRegime&) {
     return {target.of == Target::Of::steps ? Estimate{1, 1, 1} : Estimate{0, 0, 0}, ""};
   } catch (const markov::ConvergenceError& error) {
-    return {{}, error.what()};
+    return {{}, not_solved(error, options)};
   }
 }
 
 }  // namespace
+
+void require_ends(const SolveRange& range, const SolveOptions& options, const std::function<void(double end)>& check) {
+  const auto require = [&](const char* name, const std::optional<double>& told, double otherwise) {
+    try {
+      check(told.value_or(otherwise));
+    } catch (const std::invalid_argument& error) {
+      if (!told) throw;
+      throw std::invalid_argument(fmt::format("--{}: {}", name, error.what()));
+    }
+  };
+  require("from", options.from, range.from);
+  require("to", options.to, range.to);
+}
 
 std::string Target::text() const {
   const std::string number = plain_text(to_decimal(of == Of::steps ? value : 100 * value, NumberFormat::general, 6));
@@ -226,7 +247,8 @@ Solution solve(const Setting& setting, Parameter parameter, const Target& target
   if (!matters(with_value(setting, parameter, 0.5 * (from + to)), parameter))
     throw std::invalid_argument(
         fmt::format("parameter: {} has no meaning under this setting", parameter_name(parameter)));
-  for (const double end : {from, to}) check_setting(with_value(setting, parameter, end), study_options.method);
+  require_ends(range, options,
+               [&](double end) { check_setting(with_value(setting, parameter, end), study_options.method); });
   if (target.of == Target::Of::ramp_end && std::isinf(setting.ramp_length))
     throw std::invalid_argument("reach: the ramp has no end");
   StudyOptions brief = study_options;
@@ -250,7 +272,14 @@ Solution solve(const Setting& setting, Parameter parameter, const Target& target
   solution.unit = parameter_unit(parameter);
   for (const Crossing& one : solution.found) {
     const Metastability* known = kept.at(one.at.value);
-    solution.studies.push_back(known ? *known : study_for(with_value(setting, parameter, one.at.value), target, brief));
+    try {
+      solution.studies.push_back(known ? *known
+                                       : study_for(with_value(setting, parameter, one.at.value), target, brief));
+    } catch (const markov::ConvergenceError& error) {
+      throw std::runtime_error(fmt::format("{}: {} at {}: the expected steps are not known: {}", solution.parameter,
+                                           target.text(), with_unit(one.at.value, solution.unit),
+                                           not_solved(error, brief)));
+    }
   }
   return solution;
 }

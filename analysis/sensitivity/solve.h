@@ -80,6 +80,10 @@ struct SolveRange {
 /// least there is to twice that; of tips all there may be).
 SolveRange solve_range(const Setting& setting, Parameter parameter);
 
+/// Checks both ends of the range that is looked at.
+/// @throws what `check` throws; std::invalid_argument that names the option, --from or --to, where it stated the end
+void require_ends(const SolveRange& range, const SolveOptions& options, const std::function<void(double end)>& check);
+
 /// Looks at values of a parameter over a range, and finds all at which the quantity is the target's, as far as the
 /// points looked at show them (level_crossings()).
 /// @throws std::invalid_argument for a target, range or number of points that is none; std::runtime_error where no

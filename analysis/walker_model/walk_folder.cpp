@@ -13,7 +13,9 @@
 #include "analysis/experiment/experiment_toml.h"
 #include "analysis/experiment/suggestion.h"
 #include "analysis/machine_model/machine_transitions.h"
+#include "analysis/machine_model/score_plan.h"
 #include "analysis/statistics/random.h"
+#include "analysis/walker_model/leg_turns.h"
 #include "analysis/walker_model/step_least_squares.h"
 #include "analysis/walker_model/steps_reader.h"
 #include "analysis/walkers/walker_study.h"
@@ -52,14 +54,12 @@ std::vector<double> gait_of(const WalkerSetting& setting) {
   return gait_state(setting, dynamics::find_gait(setting.map().walker(), setting.slope_deg * degree));
 }
 
-// Builds the model of the walks. Where the stated walker fails from most rows, it says what to check of the columns:
-// score_plan() knows the machine, but not what its columns mean.
-std::unique_ptr<TransitionModel> transitions_of(const Walks& walks) {
+// Builds the model of the walks by `make`. Where the stated walker fails from most rows, it says what to check of the
+// columns: score_plan() knows the machine, but not what its columns mean.
+std::unique_ptr<TransitionModel> transitions_of(const Walks& walks, decltype(machine_transitions)& make) {
   try {
-    return machine_transitions(walks.machine, walks.runs);
-  } catch (const std::invalid_argument& error) {
-    const std::string said = error.what();
-    if (!said.starts_with("step: fails without noise")) throw;
+    return make(walks.machine, walks.runs);
+  } catch (const FailsFromMostRows& error) {
     const Machine& machine = *walks.machine;
     const std::vector<double> gait = gait_of({walker_from_name(machine.name), machine.parameters[0].nominal,
                                               machine.parameters[1].nominal, dynamics::Terrain::fresh});
@@ -69,8 +69,26 @@ std::unique_ptr<TransitionModel> transitions_of(const Walks& walks) {
     throw std::invalid_argument(
         fmt::format("{}: in the gait of this model {}; check that angles are in radians, that half_angle_rad is half "
                     "the angle between the legs, and the signs of the rates",
-                    said, there));
+                    error.what(), there));
   }
+}
+
+// Says of walks what OwnDrawsDiffer says of a step that its user wrote.
+std::string own_draws_differ(const Walks& walks, const OwnDrawsDiffer& error) {
+  std::size_t fell = 0, steps = 0;
+  for (const MachineTrial& trial : walks.runs.trials) {
+    fell += trial.outcome == MachineOutcome::failed;
+    steps += steps_of(trial);
+  }
+  const std::string often =
+      fell > 0 ? fmt::format(" ({} of {} walks fell, one fall in {:.0f} steps)", fell, walks.runs.trials.size(),
+                             static_cast<double>(steps) / static_cast<double>(fell))
+               : "";
+  return fmt::format(
+      "these walks cannot be diagnosed: on ground whose slope has an sd of {:.3g} deg{} the steps that the model "
+      "walker takes are not spread as the likelihood takes them (distribution functions differ by {:.2g}, {:.2g} is "
+      "allowed). Effects would be named that are not there: bring walks on more even ground",
+      walks.machine->parameters[1].nominal, often, error.apart, error.allowed);
 }
 
 // How walks that are drawn begin beside the gait, by state.
@@ -267,13 +285,31 @@ std::optional<Walks> parse_walks(const ExperimentSource& source) {
   return walks;
 }
 
+std::vector<std::string> notes_on_walks(const Walks& walks) {
+  std::vector<std::string> notes;
+  try {
+    notes = transitions_of(walks, machine_as_stated)->notes();
+  } catch (const std::invalid_argument& error) {
+    notes.push_back(fmt::format("`diagnose` will refuse these walks: {}", error.what()));
+  }
+  for (std::string& question : questions_on_leg_turns(*walks.machine, walks.runs)) notes.push_back(std::move(question));
+  return notes;
+}
+
 Diagnosis diagnose_walks(const Walks& walks, const DiagnosisOptions& options) {
   if (!options.elsewhere.empty()) throw std::invalid_argument("--at-slope, --at-speed: have no meaning with walks");
-  std::shared_ptr<const TransitionModel> model = transitions_of(walks);
+  std::shared_ptr<const TransitionModel> model = transitions_of(walks, machine_transitions);
   require_effects(options.catalogue, model->effect_ids());
-  Diagnosis answer = diagnose(std::move(model), options);
+  Diagnosis answer = [&] {
+    try {
+      return diagnose(std::move(model), options);
+    } catch (const OwnDrawsDiffer& error) {
+      throw std::runtime_error(own_draws_differ(walks, error));
+    }
+  }();
   for (StepwiseChoice& choice : least_squares_selection(*walks.machine, walks.runs, options.catalogue))
     answer.causes.stepwise.push_back(std::move(choice));
+  for (const std::string& question : questions_on_leg_turns(*walks.machine, walks.runs)) ask_first(answer, question);
   return answer;
 }
 

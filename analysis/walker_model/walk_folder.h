@@ -39,6 +39,12 @@ std::optional<Walks> read_walks(const std::filesystem::path& folder);
 /// Reads it from the texts of its files.
 std::optional<Walks> parse_walks(const ExperimentSource& source);
 
+/// Lists in sentences what diagnose_walks() says of the walks themselves: columns in other units, rows that are missing
+/// (questions_on_leg_turns()), and why it refuses them. It fits nothing, so that walks can be looked over as they are
+/// brought in.
+std::vector<std::string> notes_on_walks(const Walks& walks);
+
+/// Asks questions_on_leg_turns() behind the verdict.
 /// @throws as machine_transitions() and diagnose(), with what to check of the columns where the walker fails from most
 ///   rows; std::invalid_argument for another slope or speed, which walks do not have, and for an effect of the
 ///   catalogue that this machine does not know

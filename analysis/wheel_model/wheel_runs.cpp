@@ -358,10 +358,18 @@ void prepare_settled(WheelRuns& measured, const Experiment& experiment) {
   const double root = std::sqrt(std::max(1.0, static_cast<double>(all - left_out))), known = settled_precision * root;
   measured.law_error = std::clamp(3 * measured.noise_seen, known, std::max(known, 0.03));
   measured.slide_error = settled_slide_precision * root;
-  measured.notes.push_back(
-      fmt::format("`settled` is held to tell a next speed to {:.2g} rad/s: {:.2g} rad/s, as n "
-                  "touches of it have an error of form in common, times the root of n",
-                  measured.law_error, settled_precision));
+  const std::string why =
+      measured.law_error > known
+          ? fmt::format("three times the scatter of the measured stances, {:.2g} rad/s, and 0.03 rad/s at most",
+                        measured.noise_seen)
+          : fmt::format(
+                "{:.2g} rad/s, by which speeds computed under this law may be wrong, all in the same direction, "
+                "times the square root of the {} collisions",
+                settled_precision, all - left_out);
+  measured.notes.push_back(fmt::format(
+      "a measured speed that differs from the one that `settled` foretells by up to about {:.2g} rad/s is no "
+      "sign of a gap. This allowance is {}",
+      measured.law_error, why));
   std::vector<double> speeds;
   for (const WheelRun& run : measured.runs)
     for (const RunCollision& m : run.collisions) speeds.push_back(m.before);

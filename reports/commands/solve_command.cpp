@@ -97,7 +97,7 @@ analysis::WalkerSetting walker_with(const SolveRequest& request, double value) {
 Solution solve_walker(const SolveRequest& request, const analysis::SolveOptions& options, Looking& looking) {
   const auto with = [&](double value) { return walker_with(request, value); };
   const analysis::SolveRange range = walker_range(request);
-  for (const double end : {options.from.value_or(range.from), options.to.value_or(range.to)}) with(end).map();
+  analysis::require_ends(range, options, [&](double end) { with(end).map(); });
   Solution solution =
       analysis::solve([&](double value, int threads) { return walker_answer(request, with(value), threads, looking); },
                       request.target, range, options);

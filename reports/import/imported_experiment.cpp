@@ -230,7 +230,7 @@ void count(Imported& imported, const std::vector<ImportedRow>& rows, const std::
 // Reads the folder's texts as they will be read. @throws analysis::InputError
 void read_back(Imported& imported, Subject subject) {
   if (subject == Subject::walks) {
-    analysis::parse_walks(imported.source);
+    imported.notes = analysis::notes_on_walks(*analysis::parse_walks(imported.source));
     return;
   }
   const bool angles = imported.source.angle_csv.has_value();

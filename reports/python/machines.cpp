@@ -2,6 +2,7 @@
 
 #include <fmt/format.h>
 
+#include <map>
 #include <memory>
 #include <optional>
 #include <stdexcept>
@@ -90,6 +91,7 @@ std::shared_ptr<analysis::Machine> machine_of(const py::dict& fields) {
   machine->may_vary = given.texts("may_vary");
   machine->inputs = given.texts("inputs");
   machine->most_wild = given.number("most_wild");
+  machine->units = fields["units"].cast<std::map<std::string, std::string>>();
   for (const auto& [state, value] : fields["sensor"].cast<py::dict>()) {
     const auto both = value.cast<std::pair<std::optional<double>, double>>();
     machine->observe.push_back({state.cast<std::string>(), both.first, both.second});

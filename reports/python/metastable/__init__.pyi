@@ -337,6 +337,7 @@ class Machine:
     inputs: Tuple[str, ...]
     angles: Tuple[str, ...]
     most_wild: float
+    units: Dict[str, str]
     name: str
     def walker(self, start: Optional[ArrayLike] = None, **values: float) -> Walker: ...
 
@@ -537,7 +538,7 @@ def machine(step: Callable[..., Tuple[ArrayLike, ArrayLike]], *, states: Sequenc
             parameters: Mapping[str, Sequence[float]], effects: Mapping[str, Mapping[str, Sequence[float]]] = {},
             may_vary: Sequence[str] = (), sensor: Optional[Mapping[str, Any]] = None,
             launch: Mapping[str, Sequence[float]] = {}, inputs: Sequence[str] = (), most_wild: float = 0.01,
-            angles: Union[str, Sequence[str]] = (),
+            angles: Union[str, Sequence[str]] = (), units: Mapping[str, str] = {},
             name: str = "machine") -> Machine: ...
 
 

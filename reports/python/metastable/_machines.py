@@ -88,7 +88,8 @@ def _unwrapped(values, state, index, names, about):
 class Machine:
     """A simulator with its names; see machine()."""
 
-    def __init__(self, step, *, states, noise, parameters, effects, may_vary, sensor, launch, inputs, most_wild, angles, name):
+    def __init__(self, step, *, states, noise, parameters, effects, may_vary, sensor, launch, inputs, most_wild, angles, units,
+                 name):
         if not callable(step):
             raise TypeError(f"step: a function expected, not {type(step).__name__}")
         self.noise, self.name = noise, name
@@ -107,7 +108,17 @@ class Machine:
         self.launch = {state: _row_of_numbers(value, 2, 2, f"launch: {state}") for state, value in dict(launch).items()}
         self.inputs = _words(inputs, "inputs")
         self.most_wild = most_wild
+        self.units = self._stated_units(dict(units))
         _metastable.check_machine(self._fields())
+
+    def _stated_units(self, units):
+        known = [*self.states, *self.parameters, *(name for inner in self.effects.values() for name in inner), *self.inputs]
+        for name, unit in units.items():
+            if name not in known:
+                raise InputError(f"units: \"{name}\" is none of {', '.join(known)}")
+            if not isinstance(unit, str):
+                raise TypeError(f"units: {name}: a word expected, not {type(unit).__name__}")
+        return units
 
     def _fields(self):
         return {key: list(value) if isinstance(value, tuple) else value for key, value in self.__dict__.items()}
@@ -542,7 +553,7 @@ def _outcomes_by_trial(items, trials, conditions, condition_names):
 
 
 def machine(step, *, states, noise, parameters, effects={}, may_vary=(), sensor=None, launch={}, inputs=(), most_wild=0.01,
-            angles=(), name="machine"):
+            angles=(), units={}, name="machine"):
     """Any simulator as a machine whose sim-to-real gap is diagnosed: diagnose(runs, machine) then takes it.
 
     step        step(state, noise, p) -> (next, failed), vectorised: `state` is an (n, states) array, `noise` an (n, noise)
@@ -566,9 +577,13 @@ def machine(step, *, states, noise, parameters, effects={}, may_vary=(), sensor=
     most_wild   largest share of rows that may say nothing (missed events, bad tracks), 0 to 0.2
     angles      states that are angles [rad] and may wrap: `step` gets them within pi of zero and may return them in any
                 turn, and runs may hold them in any turn; they are taken to move by less than pi in a step
+    units       name of a state, a parameter, an effect's parameter or an input -> its unit, in which the answer tells
+                sizes of it. Without one a name tells it by its end: swing_rad_s is in rad/s, loss_n_m in N m, per_rad in
+                1/rad; other names have none. Units are words in the answer, nothing is converted
     """
     return Machine(step, states=states, noise=noise, parameters=parameters, effects=effects, may_vary=may_vary,
-                   sensor=sensor, launch=launch, inputs=inputs, most_wild=most_wild, angles=angles, name=name)
+                   sensor=sensor, launch=launch, inputs=inputs, most_wild=most_wild, angles=angles,
+                   units=units, name=name)
 
 
 def runs(machine, data=None, *, outcome=None, labels=(), inputs=None, **columns):

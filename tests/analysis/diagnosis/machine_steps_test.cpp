@@ -10,6 +10,7 @@
 #include <utility>
 #include <vector>
 
+#include "dynamics/numerics/truncated_normal.h"
 #include "tests/analysis/line.h"
 
 namespace metastable::analysis {
@@ -119,6 +120,16 @@ TEST(MachineSteps, ACountThatSaysLittleLeavesTheModel) {
   EXPECT_NEAR(alone.value, 300, 15);
   EXPECT_NEAR(with.value / alone.value, 1, 0.02);
   EXPECT_NEAR(with.lower / alone.lower, 1, 0.05);
+}
+
+// The kernels that stand for a few draws spread no further than these do.
+TEST(MachineSteps, AFewDrawsAreNotSpreadFurther) {
+  std::vector<double> draws;
+  for (int i = 0; i < 16; ++i) draws.push_back(300 * std::exp(0.3 * dynamics::normal_quantile((i + 0.5) / 16)));
+  const Estimate joined = joined_steps(draws, draws, {1e-6, 0}, 0, 0), moments = interval_of_draws(draws);
+  const double ratio = std::log(joined.upper / joined.lower) / std::log(moments.upper / moments.lower);
+  EXPECT_LT(ratio, 1.05);
+  EXPECT_GT(ratio, 0.9);
 }
 
 // A count narrows what a model's error leaves open, and a model what a count does.

@@ -8,6 +8,7 @@
 #include <random>
 #include <set>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "analysis/diagnosis/diagnosis.h"
@@ -212,6 +213,64 @@ TEST(MachineAnswers, RankEffectsThatActAlikeInTheSameSets) {
       EXPECT_TRUE(std::ranges::any_of(d.causes.ranked, with)) << one << told(d);
     }
   }
+}
+
+// Returns a mass that a recorded force with noise holds near zero, and runs of one on which a constant force acts, too.
+std::pair<Machine, MachineRuns> held_mass(double constant_force) {
+  Machine machine;
+  machine.name = "mass";
+  machine.states = {"x_m", "v_m_s"};
+  machine.observe = {{"x_m", 0.002}, {"v_m_s", 0.005}};
+  machine.inputs = {"force_n"};
+  machine.parameters = {{"gain", 1, 0.05}, {"sd", 0.5, 0.1, 0.05, 3}};
+  machine.step = [](const MachineBatch& batch) {
+    for (std::size_t i = 0; i < batch.rows; ++i) {
+      const double v =
+          batch.states[2 * i + 1] + 0.1 * (batch.value(0, i) * batch.value(2, i) + batch.value(1, i) * batch.scores[i]);
+      batch.next[2 * i] = batch.states[2 * i] + 0.1 * v;
+      batch.next[2 * i + 1] = v;
+    }
+  };
+  MachineRuns runs;
+  std::mt19937_64 generator(1);
+  std::normal_distribution<double> normal;
+  for (int t = 0; t < 30; ++t) {
+    MachineTrial& trial = runs.trials.emplace_back();
+    double x = 0.2 * normal(generator), v = 0.2 * normal(generator);
+    for (int k = 0; k < 15; ++k) {
+      const double force = -x - 1.5 * v + normal(generator);
+      MachineRow& row = trial.rows.emplace_back();
+      row.seen = {x + 0.002 * normal(generator), v + 0.005 * normal(generator)};
+      row.inputs = {force};
+      v += 0.1 * (force + 0.5 * normal(generator) + constant_force);
+      x += 0.1 * v;
+    }
+    trial.outcome = MachineOutcome::stopped;
+  }
+  return {machine, runs};
+}
+
+// A force that no effect has is no memory of the noise, which can do some of what it does.
+TEST(MachineAnswers, GiveAConstantForceNoName) {
+  const auto [machine, runs] = held_mass(0.6);
+  const Diagnosis d = answer_to(machine, runs, {});
+  EXPECT_EQ(d.verdict, Verdict::unexplained) << told(d);
+  EXPECT_TRUE(d.causes.at_work.empty()) << told(d);
+  EXPECT_NE(d.causes.even_push.find("fits better than any name of the catalogue"), std::string::npos) << told(d);
+}
+
+// A simulation replays the force, whatever the state: what holds the machine is not in it.
+TEST(MachineAnswers, TellNoStepsOfAMachineWhoseInputsWereRecorded) {
+  auto [machine, runs] = held_mass(0);
+  const Diagnosis d = answer_to(machine, runs, {"memory"});
+  EXPECT_EQ(d.verdict, Verdict::no_gap) << told(d);
+  EXPECT_EQ(d.shrinkage.steps.with_effect, 0);
+  ASSERT_EQ(d.shrinkage.steps.machine.size(), 1u) << told(d);
+  EXPECT_TRUE(d.shrinkage.steps.machine[0].at_least);
+  EXPECT_NEAR(d.shrinkage.steps.machine[0].steps.lower, 30 * 14 / 2.9957, 0.5);  // No trial failed.
+  EXPECT_TRUE(std::ranges::any_of(d.data.notes, [](const std::string& note) {
+    return note.find("no model tells the expected steps: force_n was recorded") != std::string::npos;
+  })) << told(d);
 }
 
 }  // namespace

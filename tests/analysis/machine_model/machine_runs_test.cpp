@@ -73,6 +73,18 @@ TEST_F(LookedOver, AStepThatHangsOnOtherRowsIsRefused) {
   EXPECT_NE(mixed.find("arrays of one number a row"), std::string::npos) << mixed;
 }
 
+TEST_F(LookedOver, AStepThatTakesTheMeanOfAllRowsIsRefused) {
+  const auto right = machine_.step;
+  machine_.step = [&](const MachineBatch& batch) {
+    right(batch);
+    double mean = 0;
+    for (std::size_t i = 0; i < batch.rows; ++i) mean += batch.states[i] / static_cast<double>(batch.rows);
+    for (std::size_t i = 0; i < batch.rows; ++i) batch.next[i] -= 0.3 * mean;
+  };
+  const std::string said_of_it = message_of([&] { said(); });
+  EXPECT_NE(said_of_it.find("when some of the others are not asked for"), std::string::npos) << said_of_it;
+}
+
 TEST_F(LookedOver, NoiseThatChangesNothingIsNoted) {
   machine_.scores = 2;
   machine_.step = [](const MachineBatch& batch) {

@@ -145,7 +145,7 @@ TEST(Solve, RefusesWhatHasNoMeaning) {
   expect_message("steps: 1 is outside (1, inf)", solved(Parameter::slope, {Of::steps, 1, 0}, {}));
   expect_message("survive: probability 1 is outside (0, 1)", solved(Parameter::slope, {Of::survival, 1, 10}, {}));
   expect_message("reach: probability 0 is outside", solved(Parameter::slope, {Of::ramp_end, 0, 0}, {}));
-  expect_message("slope: 30 deg is outside", solved(Parameter::slope, hundred, {.from = 5, .to = 30}));
+  expect_message("--to: slope: 30 deg is outside", solved(Parameter::slope, hundred, {.from = 5, .to = 30}));
   expect_message("from: 9 is not below to: 5", solved(Parameter::friction_mean, hundred, {.from = 9, .to = 5}));
   expect_message("points: 2 is outside 3..1000", solved(Parameter::slope, hundred, {.points = 2}));
 }

@@ -1,5 +1,6 @@
 // metastable import --walker: walks that a CSV tells come back as the same walks.
 
+#include <fmt/format.h>
 #include <gtest/gtest.h>
 
 #include <cmath>
@@ -67,6 +68,40 @@ TEST_F(Import, RefusesWalksWhoseLegsDoNotTakeTurns) {
   expect_refused(import({csv, "--walker", "simplest", "--slope", "0.5", "--slope-sd", "0.05", "--legs-from", "0",
                          "--columns", "trial=run,phase=foot,half_angle=theta[rad]"}),
                  csv + ":4: phase: leg 2 does not stand after leg 2: a row is missing, or out of order");
+}
+
+// Walks of the compass gait, with its half angles times a factor.
+std::string walks_with_angles(double factor) {
+  analysis::WalkOptions options;
+  options.trials = 6;
+  options.longest = 12;
+  options.threads = 1;
+  const analysis::WalkerSetting setting{analysis::Walker::compass, 3, 0.3, dynamics::Terrain::fresh};
+  const analysis::Walks walks =
+      *analysis::parse_walks(analysis::source_of(analysis::draw_walks(setting, {}, options, "drawn"), "drawn"));
+  std::string csv = "run,a,b,c\n";
+  for (std::size_t t = 0; t < walks.runs.trials.size(); ++t)
+    for (const analysis::MachineRow& row : walks.runs.trials[t].rows)
+      csv += fmt::format("{},{:.6f},{:.6f},{:.6f}\n", t + 1, factor * row.seen[0], row.seen[1], row.seen[2]);
+  return csv;
+}
+
+// The import says of units what a diagnosis would say.
+TEST_F(Import, AsksAboutWalksInOtherUnits) {
+  const auto said = [&](const std::string& csv, const std::string& unit_of_rates) {
+    const Ran ran = import(
+        {file("walks.csv", csv), "--walker", "compass", "--slope", "3", "--slope-sd", "0.3", "--columns",
+         "trial=run,half_angle=a[rad],stance_rate=b[" + unit_of_rates + "],swing_rate=c[" + unit_of_rates + "]"});
+    EXPECT_EQ(ran.code, 0) << ran.err;
+    return ran.out;
+  };
+  EXPECT_EQ(said(walks_with_angles(1), "rad/s").find("note: "), std::string::npos);
+  const std::string full = said(walks_with_angles(2), "rad/s");
+  EXPECT_NE(full.find("note: `diagnose` will refuse these walks: step: fails without noise"), std::string::npos)
+      << full;
+  EXPECT_NE(full.find("check that angles are in radians, that half_angle_rad is half"), std::string::npos) << full;
+  const std::string slow = said(walks_with_angles(1), "deg/s");
+  EXPECT_NE(slow.find("note: "), std::string::npos) << slow;
 }
 
 TEST_F(Import, NamesWhatWalksLack) {

@@ -64,6 +64,11 @@ class Pendulum(unittest.TestCase):
         self.assertRegex(answer.sentences[1], r"^decay is 0\.97\d* \(90 %: .* to .*\), 1\d of its stated sds from 0\.99: known "
                                               "less well than stated")
 
+    def test_units_are_those_stated_or_else_those_of_the_names(self):
+        answer = diagnosed(pendulum(units={"loss_rad": "turns"}), loss=0.004, trials=12)
+        units = {row["effect"]: row["unit"] for row in answer.visibility}
+        self.assertEqual((units["dry_friction"], units["quadratic_drag"]), ("turns", "1/rad"))
+
     def test_dry_friction_is_named_with_its_size(self):
         answer = diagnosed(loss=0.004)
         self.assertEqual(answer.verdict, "explained")
@@ -183,6 +188,8 @@ class Refused(unittest.TestCase):
         self.check("effects: dry: loss_rad: 2 numbers given, 3 to 3 expected", lambda: pendulum(effects={"dry": {"loss_rad": (0, 1)}}))
         self.check("correlation 0.7 between neighbouring rows is outside [-0.5, 0.5]", lambda: pendulum(sensor={"swing_rad": (0.1, 0.7)}))
         self.check("step: a function expected", lambda: pendulum(step=3), TypeError)
+        self.check("units: \"swing\" is none of swing_rad, decay, scatter_rad, loss_rad, per_rad", lambda: pendulum(units={"swing": "rad"}))
+        self.check("units: swing_rad: a word expected, not int", lambda: pendulum(units={"swing_rad": 3}), TypeError)
 
     def test_an_error_that_is_too_small_for_a_density(self):
         self.check("sensor: swing_rad: the machine's noise does not reach it, and the sd of its error, 1e-10, is less than 1e-06 "
