@@ -61,7 +61,8 @@ struct BlindTruth {
   /// The power left of each of several effects, or of the one of a mixture, after a recalibration that has the others
   /// in the model. It follows from the rest and the case and is not sealed; empty until complete_each().
   std::vector<double> left_by_effect = {};
-  /// The power left of the outside effect of a mixture, likewise, where it can be weighed.
+  /// The power left of the outside effect of a mixture, likewise, where it can be weighed. A walker's is sealed: it
+  /// takes the walks as they are without the effect.
   std::optional<double> left_of_outside = {};
   /// The likelihood that the model as given lacks in the mean over experiments, and each effect's part of it. It
   /// follows from the case and is not sealed. It is empty until complete_each(), and where something acts from outside

@@ -66,9 +66,9 @@ struct WalkerEntry {
 
 const std::map<std::string, WalkerEntry>& walker_entries() {
   using D = WalkerDraw;
-  const std::vector<std::string> anywhere{"speed", "collision", "phase", "leg", ":mean"};
-  const std::vector<std::string> noisy{":spread", ":memory", ":tail"};
-  const std::vector<std::string> first{"step", "collision", ":mean", ":spread"};
+  const std::vector<std::string> anywhere{"phase", "leg", ":mean"};
+  const std::vector<std::string> noisy{":spread", ":memory", ":tail", ":correlation"};
+  const std::vector<std::string> first{"step", ":mean", ":spread"};
   static const std::map<std::string, WalkerEntry> entries{
       {"hip_damping", {[](const D& d) { return one_way(d, 0.005, 2); }, anywhere}},
       {"hip_dry_friction", {[](const D& d) { return one_way(d, 0.005, 2); }, anywhere}},
@@ -81,7 +81,7 @@ const std::map<std::string, WalkerEntry>& walker_entries() {
       {"slope_deg_drift", {[](const D& d) { return two_ways(d, 0.1, 1.2); }, {"trial"}}},
       {"slope_deg_spread", {[](const D& d) { return one_way(d, 0.05, 0.6); }, {"trial", ":memory"}}},
       {"slope_deg_clock", {clock, {"time", "trial", ":memory"}}},
-      {"slope_deg_stretch", {stretch, {"position", "collision", "time"}}},
+      {"slope_deg_stretch", {stretch, {"position", "step", "time"}}},
       {"memory",
        {[](const D& d) {
           return by_size(d, 0.1, 0.85, [sign = d.sign](double s) { return std::vector{sign * s, 1.0}; });

@@ -116,11 +116,17 @@ WalkStatement draw_walk_statement(const BlindPlan& plan, BlindTruth& truth, Blin
 }
 
 // Weighs an outside effect: 2 log(likelihood of the walks without it / with it), each under a model recalibrated to
-// them. Both have the same scores and errors of sensors, so that this is what the effect moves them by. Trials that are
-// of different lengths, as one fell, cannot be compared and count as the others do in the mean.
+// them, in which the sizes of effects of the catalogue that both have are refitted. Both have the same scores and
+// errors of sensors, so that this is what the effect moves them by. Trials that are of different lengths, as one fell,
+// cannot be compared and count as the others do in the mean.
 class OutsideScales {
  public:
-  explicit OutsideScales(WalkDesign design) : design_(std::move(design)), without_(weighed()) {}
+  explicit OutsideScales(WalkDesign design, std::vector<dynamics::Effect> beside = {})
+      : design_(std::move(design)), beside_(std::move(beside)) {
+    design_.reality.effects = beside_;
+    design_.reality.outside.clear();
+    without_ = weighed();
+  }
   double power(const dynamics::OutsideEffect& effect) {
     design_.reality.outside = {effect};
     const std::vector<Weighed> with = weighed();
@@ -142,7 +148,7 @@ class OutsideScales {
     statement.walker.setting = design_.truth;
     const auto walks = parse_walks(source_of(files_of(design_, statement), "laboratory"));
     const auto model = machine_transitions(walks->machine, walks->runs);
-    const Fit fitted = fit(*model, nominal_values(*model), {});
+    const Fit fitted = fit(*model, nominal_values(*model), walk_terms(*model, beside_));
     std::vector<Weighed> trials(walks->runs.trials.size());
     for (std::size_t e = 0; e < model->events().size(); ++e) {
       Weighed& trial = trials[model->events()[e].trial];
@@ -153,6 +159,7 @@ class OutsideScales {
   }
 
   WalkDesign design_;
+  std::vector<dynamics::Effect> beside_;
   std::vector<Weighed> without_;
 };
 
@@ -171,7 +178,10 @@ void size_walker_outside(const BlindPlan& plan, double target, BlindDice& dice, 
   truth.outside = {plan.outside, find_size(0.01 * largest, largest, share * of_outside, power)};
   const double own = OutsideScales(design).power(*truth.outside);
   truth.power += own;
-  if (plan.effects.empty()) truth.left = own;
+  if (plan.effects.empty())
+    truth.left = own;
+  else
+    truth.left_of_outside = OutsideScales(design, truth.effects).power(*truth.outside);
   design.reality.outside = {*truth.outside};
 }
 

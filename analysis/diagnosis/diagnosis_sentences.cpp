@@ -62,10 +62,12 @@ void say_unnamed(std::vector<std::string>& s, const Diagnosis& d) {
       std::max_element(most->facets.begin(), most->facets.end(),
                        [](const LeftInFacet& a, const LeftInFacet& b) { return a.evidence < b.evidence; });
   if (facet->evidence < worth_saying) return;
-  s.push_back(
-      fmt::format("{} it acts by {}, on the {} of {}.",
-                  most->beside.empty() ? "By itself" : fmt::format("Beside {}", fmt::join(most->beside, " and ")),
-                  facet->facet, facet->aspect, facet->stance ? "stances" : d.data.step_name + "s"));
+  const std::string how =
+      most->beside.empty() ? "By itself" : fmt::format("Beside {}", fmt::join(most->beside, " and "));
+  s.push_back(facet->aspect == "correlation"
+                  ? how + " it makes the errors of two columns go together."
+                  : fmt::format("{} it acts by {}, on the {} of {}.", how, facet->facet, facet->aspect,
+                                facet->stance ? "stances" : d.data.step_name + "s"));
 }
 
 constexpr double rounded_share = 0.1;  // Convention: of one effect alone, shares that differ by less are said as one.
@@ -252,6 +254,7 @@ std::string where_in_words(const GapCell& cell, const std::string& step_name) {
   if (cell.aspect == "spread")
     return fmt::format("the spread of {} ({:.2g} % {} than the model's)", at, 100 * std::abs(cell.size),
                        cell.size < 0 ? "less" : "more");
+  if (cell.aspect == "correlation") return fmt::format("the correlation of {} ({:+.2g})", at, cell.size);
   return fmt::format("the {} of {} ({:+.2g} {})", cell.aspect, at, cell.size, cell.unit);
 }
 

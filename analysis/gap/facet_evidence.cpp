@@ -146,7 +146,8 @@ std::vector<LeftInFacet> left_by_facet(const TransitionModel& model, const Fit& 
   for (std::size_t c = 0; c < mapped.cells.size(); ++c)
     if (const GapCell& cell = mapped.cells[c]; !cell.swing && cell.facet != "outcome" && !is_form_of_contact(cell)) {
       const bool memory = mapped.columns[c].measure == Measure::correlation;  // a facet of its own
-      facets[{memory ? cell.at : cell.facet, cell.aspect, cell.stance}].push_back(std::move(mapped.columns[c]));
+      facets[{memory && cell.aspect != "correlation" ? cell.at : cell.facet, cell.aspect, cell.stance}].push_back(
+          std::move(mapped.columns[c]));
     }
   const std::vector<EventResidual> left = residuals(model, fit.evaluation);
   for (const EventPhase& phase : event_phases(model)) add_unmapped(facets, model, left, phase);

@@ -9,8 +9,9 @@ namespace metastable::analysis {
 
 /// A cell of the map says how far one aspect is off in one place.
 struct GapCell {
-  std::string facet;           ///< speed, leg, position, collision, trial, time, phase, condition, outcome
-  std::string aspect;          ///< mean, spread, tail, memory
+  /// Cells are sorted by speed, leg, position, collision, trial, time, phase, condition, outcome or pair of columns.
+  std::string facet;
+  std::string aspect;          ///< mean, spread, tail, memory, correlation
   std::string at;              ///< the cell in words, with its phase where stance and collision are separate
   bool stance = false;         ///< of stance events, where they are separate
   bool swing = false;          ///< cosine or sine of the time since the previous collision: one of many

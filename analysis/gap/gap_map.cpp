@@ -2,7 +2,10 @@
 
 #include <algorithm>
 #include <cmath>
+#include <map>
 #include <numbers>
+#include <set>
+#include <tuple>
 
 #include "analysis/fitting/effect_scan.h"
 #include "analysis/gap/map_columns.h"
@@ -58,9 +61,58 @@ double left_of_shift(const MapColumn& column, const Fit& fit, const Eigen::Matri
   return 1 - (root.transpose() * follows).squaredNorm() / column.variance;
 }
 
+// Returns the standard normal of a spread larger than the model's: where scores spread by `ratio` of their variance,
+// their squares do, too, and the sum of these weighed by their own scatter would not pass a few standard deviations. So
+// the ratio is held against a chi-square's, by Wilson and Hilferty (1931), with fewer degrees of freedom where squares
+// scatter more than those of normal scores: by a factor of `excess`.
+double larger_spread(double ratio, double events, double excess) {
+  const double degrees = events / std::max(1.0, excess), part = 2 / (9 * degrees);
+  return (std::cbrt(ratio) - 1 + part) / std::sqrt(part);
+}
+
+// Returns what tells the phase and the column of some events from others.
+std::tuple<bool, bool, std::size_t> phase_of(const MapColumn& column, const TransitionModel& model) {
+  const Event& one = model.events()[column.terms.front().first];
+  return {one.kind == EventKind::launch, is_stance(one.kind), one.column};
+}
+
+// Returns, for each phase, by what factor squares of its scores scatter more than those of normal ones. A cell of few
+// events may lack the far ones.
+std::map<std::tuple<bool, bool, std::size_t>, double> excess_by_phase(const std::vector<GapCell>& cells,
+                                                                      const std::vector<MapColumn>& columns,
+                                                                      const TransitionModel& model) {
+  std::map<std::tuple<bool, bool, std::size_t>, double> excess;
+  for (std::size_t k = 0; k < columns.size(); ++k) {
+    if (cells[k].facet != "phase" || columns[k].measure != Measure::spread) continue;
+    double sum = 0, squares = 0;
+    for (const auto& [event, value] : columns[k].terms) sum += value, squares += value * value;
+    const auto n = static_cast<double>(columns[k].terms.size());
+    double& most = excess[phase_of(columns[k], model)];
+    most = std::max(most, (squares / n - std::pow(sum / n, 2)) / std::pow(1 + std::numbers::sqrt2 * sum / n, 2));
+  }
+  return excess;
+}
+
+// Returns the mean score of the events whose spread is column k: a shift spreads squares about zero, too. The column of
+// a cell's mean stands before that of its spread.
+double mean_of_cell(const std::vector<MapColumn>& columns, std::size_t k) {
+  if (k == 0 || columns[k - 1].measure != Measure::shift || columns[k - 1].terms.size() != columns[k].terms.size())
+    return 0;
+  double sum = 0;
+  for (const auto& [event, score] : columns[k - 1].terms) sum += score;
+  return sum / static_cast<double>(columns[k].terms.size());
+}
+
+std::size_t trials_of(const MapColumn& column, const TransitionModel& model) {
+  std::set<std::size_t> trials;
+  for (const auto& term : column.terms) trials.insert(model.events()[term.first].trial);
+  return trials.size();
+}
+
 // Gives the cells their own statistics, sizes and p-values.
 void standardise(std::vector<GapCell>& cells, const std::vector<MapColumn>& columns, const EfficientColumns& efficient,
-                 const Units& units, const Fit& fit) {
+                 const Units& units, const Fit& fit, const TransitionModel& model) {
+  const auto excess = excess_by_phase(cells, columns, model);
   const Eigen::MatrixXd root = fit.information.rows() > 0 ? resolved_root(fit.information) : fit.information;
   for (std::size_t k = 0; k < columns.size(); ++k) {
     const MapColumn& column = columns[k];
@@ -73,15 +125,24 @@ void standardise(std::vector<GapCell>& cells, const std::vector<MapColumn>& colu
     const double squares = efficient.dense.col(c).squaredNorm();
     const double kept = whole > 0 ? squares / whole : 1;
     const double own = std::max(kept * column.variance, 1e-24);
+    const double by_trial = std::max(units.rows.col(c).squaredNorm(), units.scatter[c]);
     const double scale =
-        std::sqrt(std::max({own, squares, units.rows.col(c).squaredNorm(), units.scatter[c], least_left * whole}) +
-                  efficient.by_prior.col(c).squaredNorm());
+        std::sqrt(std::max({own, squares, by_trial, least_left * whole}) + efficient.by_prior.col(c).squaredNorm());
     GapCell& cell = cells[k];
     cell.statistic = std::isfinite(sum) ? sum / scale : 0;  // a fit far off may have no slopes to project on
     // Products of scores spread by what they look for: whether there is anything, the model's own variance tells.
     if (column.measure == Measure::correlation && std::isfinite(sum)) {
       const double plain = std::clamp(sum / std::sqrt(own), -beyond_doubt, beyond_doubt);
       if (std::abs(plain) > std::abs(cell.statistic)) cell.statistic = plain;
+    }
+    if (column.measure == Measure::spread && sum > 0 && std::isfinite(sum)) {
+      const double left = std::max(least_left, kept) * column.variance, middle = mean_of_cell(columns, k);
+      const double ratio = std::max(0.1, 1 + std::numbers::sqrt2 * sum / left - middle * middle);
+      const double scatter = std::max(squares - sum * sum / static_cast<double>(column.terms.size()),
+                                      by_trial - sum * sum / static_cast<double>(trials_of(column, model)));
+      const auto of_phase = excess.find(phase_of(column, model));
+      const double most = std::max(scatter / (left * ratio * ratio), of_phase == excess.end() ? 1 : of_phase->second);
+      cell.statistic = std::max(cell.statistic, std::min(beyond_doubt, larger_spread(ratio, left, most)));
     }
     // The efficient size is the score by its information, so that size and statistic have one sign.
     const bool shift = column.measure == Measure::shift;
@@ -182,7 +243,7 @@ GapMap gap_map(const TransitionModel& model, const Fit& fit, int draws, std::uin
   if (map.cells.empty()) return map;  // too few transitions for a single cell
   const EfficientColumns efficient = project(all.columns, model, fit);
   const Units units = units_of_chance(efficient, model);
-  standardise(map.cells, all.columns, efficient, units, fit);
+  standardise(map.cells, all.columns, efficient, units, fit, model);
 
   std::vector<double> sizes;
   for (const GapCell& cell : map.cells) sizes.push_back(std::abs(cell.statistic));

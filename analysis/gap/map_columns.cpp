@@ -1,5 +1,7 @@
 #include "analysis/gap/map_columns.h"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <cmath>
 #include <map>
@@ -14,9 +16,10 @@ namespace metastable::analysis {
 namespace {
 
 constexpr double tail_score = 2.2;
-constexpr double central_score = 1.5;          // below it an event is in the middle of its distribution
-constexpr double least_rests = 3;              // seen or expected, for a statement on them
-constexpr std::size_t least_successions = 20;  // of two scores in a trial, for a statement on memory
+constexpr double central_score = 1.5;           // below it an event is in the middle of its distribution
+constexpr double least_rests = 3;               // seen or expected, for a statement on them
+constexpr std::size_t least_successions = 20;   // of two scores in a trial, for a statement on memory
+constexpr std::size_t most_paired_columns = 6;  // A machine with more has too many pairs.
 
 EventResidual residual(EventKind kind, double score, double log_density) {
   const double share_beyond = 2 * dynamics::normal_cdf(-tail_score);
@@ -138,6 +141,53 @@ void add_memory(MapColumns& all, const TransitionModel& model, const std::vector
   all.add(trials, "spread", "correlation", between / pairs, std::move(whole));
 }
 
+// Adds correlations of the columns of a machine: two in one step, and one with another a step later. An error of a
+// sensor moves several at once, and what is predicted from it as well.
+void add_pairs(MapColumns& all, const TransitionModel& model, const std::vector<EventResidual>& residuals,
+               const std::vector<EventPhase>& phases) {
+  if (phases.size() < 2 || phases.size() > most_paired_columns) return;
+  using Row = std::pair<std::size_t, int>;  // These are the trial and the number of a step.
+  struct Scored {
+    std::size_t event;
+    double score;
+  };
+  std::vector<std::map<Row, Scored>> scored(phases.size());
+  for (std::size_t p = 0; p < phases.size(); ++p)
+    for (const std::size_t i : phases[p].members)
+      scored[p][{model.events()[i].trial, model.events()[i].number}] = {i, residuals[i].mean};
+  for (auto& column : scored) {
+    double middle = 0, square = 0;
+    for (const auto& [row, one] : column) middle += one.score / static_cast<double>(column.size());
+    for (const auto& [row, one] : column)
+      square += std::pow(one.score - middle, 2) / static_cast<double>(column.size());
+    for (auto& [row, one] : column) one.score = (one.score - middle) / std::sqrt(std::max(1.0, square));
+  }
+  for (std::size_t a = 0; a < phases.size(); ++a)
+    for (std::size_t b = 0; b < phases.size(); ++b)
+      for (const int later : {0, 1}) {
+        if (a == b || (later == 0 && a > b)) continue;
+        MapCell cell{"pair of columns",
+                     fmt::format(fmt::runtime(later == 1 ? "{}, then {} a {} later" : "{} and {} of one {}"),
+                                 model.columns()[phases[a].column].name, model.columns()[phases[b].column].name,
+                                 model.step_name()),
+                     {},
+                     phases[b].stance};
+        MapColumn together{Measure::correlation, {}, 0, {}};
+        double sum = 0;
+        for (const auto& [row, one] : scored[b]) {
+          const auto other = scored[a].find({row.first, row.second - later});
+          if (other == scored[a].end()) continue;
+          together.terms.emplace_back(one.event, one.score * other->second.score);
+          sum += together.terms.back().second;
+          cell.events.push_back(one.event);
+        }
+        if (together.terms.size() < least_successions) continue;
+        together.variance = static_cast<double>(together.terms.size());
+        const double correlation = sum / together.variance;
+        all.add(cell, "correlation", "correlation", correlation, std::move(together));
+      }
+}
+
 // Puts rests against what the model expects at the same speeds.
 void add_rests(MapColumns& all, const TransitionModel& model, const Fit& fit) {
   const auto& events = model.events();
@@ -179,7 +229,9 @@ MapColumns map_columns(const TransitionModel& model, const Fit& fit) {
   const std::vector<EventResidual> left = residuals(model, fit.evaluation);
   MapColumns all;
   add_cells(all, model, left, units_of_score(model.events(), fit.evaluation));
-  for (const EventPhase& phase : event_phases(model)) add_memory(all, model, left, phase);
+  const std::vector<EventPhase> phases = event_phases(model);
+  for (const EventPhase& phase : phases) add_memory(all, model, left, phase);
+  if (model.columns().size() > 1) add_pairs(all, model, left, phases);
   add_rests(all, model, fit);
   return all;
 }

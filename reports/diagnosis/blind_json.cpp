@@ -22,6 +22,13 @@ std::optional<std::pair<double, double>> interval(const ordered_json& j) {
   return std::pair{j[0].get<double>(), j[1].is_number() ? j[1].get<double>() : std::numeric_limits<double>::infinity()};
 }
 
+// The facet "phase" is the whole of a phase, and of walkers, whose phases are what a wheel's legs are, one of them.
+analysis::BlindAnswer::ClaimedPlace claimed_place(const ordered_json& w) {
+  const auto facet = w.at("facet").get<std::string>();
+  const bool leg = facet == "phase" && w.value("at", "").starts_with("phase ");
+  return {leg ? "leg" : facet, w.at("aspect").get<std::string>(), w.at("p_adjusted").get<double>()};
+}
+
 }  // namespace
 
 std::string truth_json(const analysis::BlindTruth& truth, const std::string& salt) {
@@ -39,6 +46,7 @@ std::string truth_json(const analysis::BlindTruth& truth, const std::string& sal
   j["strength"] = truth.strength;
   j["power"] = truth.power;
   j["power_left_after_recalibration"] = truth.left;
+  if (truth.left_of_outside) j["power_left_of_outside"] = *truth.left_of_outside;
   j["collisions_counted"] = truth.collisions_counted;
   j["rests_counted"] = truth.rests_counted;
   j["nominal_is_true"] = truth.nominal_is_true;
@@ -67,6 +75,7 @@ analysis::BlindTruth read_truth(const std::string& file, std::string_view text) 
     truth.strength = j.at("strength").get<int>();
     truth.power = j.at("power").get<double>();
     truth.left = j.at("power_left_after_recalibration").get<double>();
+    if (j.contains("power_left_of_outside")) truth.left_of_outside = j.at("power_left_of_outside").get<double>();
     truth.collisions_counted = j.value("collisions_counted", 0.0);
     truth.rests_counted = j.value("rests_counted", 0.0);
     truth.nominal_is_true = j.at("nominal_is_true").get<bool>();
@@ -126,9 +135,7 @@ analysis::BlindAnswer read_answer(const std::string& file, std::string_view text
     }
     if (j.contains("stepwise"))
       answer.stepwise = j.at("stepwise").get<std::map<std::string, std::vector<std::string>>>();
-    for (const ordered_json& w : j.at("where"))
-      answer.where.push_back(
-          {w.at("facet").get<std::string>(), w.at("aspect").get<std::string>(), w.at("p_adjusted").get<double>()});
+    for (const ordered_json& w : j.at("where")) answer.where.push_back(claimed_place(w));
     const ordered_json& shrinkage = j.at("shrinkage");
     const ordered_json interval = shrinkage.value("closed_interval_90", ordered_json());
     if (interval.is_array() && interval.size() == 2 && interval[0].is_number() && interval[1].is_number()) {

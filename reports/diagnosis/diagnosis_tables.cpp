@@ -98,14 +98,16 @@ Cell together(double p) { return p < 1e-11 ? Cell(NotShown{{p, p, p}, "< 10⁻¹
 Table gap_table(const Diagnosis& d) {
   return {.id = "gap",
           .title = "Is there a gap?",
-          .columns = {{"model"}, {"against"}, {"p", "", NumberFormat::p_value, 2}},
+          .notes = {"p is the chance that a model that is right looks at least as wrong as this one does, in what its "
+                    "row says may be wrong."},
+          .columns = {{"model"}, {"what may be wrong"}, {"p", "", NumberFormat::p_value, 2}},
           .rows = {{"as given", "anything", together(d.gap.p_as_given)},
-                   {"as given", "other parameters", together(d.gap.p_recalibration)},
+                   {"as given", "its parameters", together(d.gap.p_recalibration)},
                    {"recalibrated", "anything else", together(d.gap.p_value)},
-                   {"recalibrated", "the effects of the catalogue", together(d.gap.p_effects)},
-                   {"recalibrated", "the cells of the map", together(d.gap.p_where)},
+                   {"recalibrated", "an effect of the catalogue", together(d.gap.p_effects)},
+                   {"recalibrated", "a cell of the map", together(d.gap.p_where)},
                    {"recalibrated", "all cells of a facet", together(d.gap.p_facets)},
-                   {"recalibrated", "what varies without a name", together(d.gap.p_variations)}}};
+                   {"recalibrated", "a variation without a name", together(d.gap.p_variations)}}};
 }
 
 Table contact_table(const Diagnosis& d) {
@@ -280,9 +282,9 @@ Table steps_table(const Diagnosis& d) {
     return machine.at_least ? Cell(fmt::format("at least {} (95 %)", short_number(machine.steps.lower)))
                             : Cell(machine.steps);
   };
-  // A machine that is not known to fail has no steps before it does.
-  if (!(s.observed > 0) && s.machine.empty() && std::isinf(s.baseline) && std::isinf(s.recalibrated) &&
-      std::isinf(s.with_effect))
+  // A machine that is not known to fail has no steps before it does, and models may have none to tell.
+  const auto tells = [](double steps) { return steps > 0 && std::isfinite(steps); };
+  if (!(s.observed > 0) && s.machine.empty() && !tells(s.baseline) && !tells(s.recalibrated) && !tells(s.with_effect))
     return table;
   const auto here = std::ranges::find(s.machine, "", &analysis::MachineSteps::where);
   table.rows.push_back({"as measured",
@@ -325,12 +327,14 @@ Table profile_table(const Diagnosis& d) {
 }
 
 Table visibility_table(const Diagnosis& d) {
-  Table table{.id = "visibility",
-              .title = "What these data could have seen",
-              .notes = {fmt::format("Smallest: the size that most experiments like this one would find (2 Δ ln L of "
-                                    "{:.0f}). Alike: effects that imitate more than half of its information.",
-                                    d.rules.seen_gain)},
-              .columns = {{"effect"}, {"parameter"}, {"smallest"}, {"unit"}, {"alike"}, {"cannot be told because"}}};
+  Table table{
+      .id = "visibility",
+      .title = "What these data could have seen",
+      .notes = {fmt::format("Smallest: the size that most experiments like this one would find (2 Δ ln L of "
+                            "{:.0f}). Looks like: another effect that would explain this share of what the effect does "
+                            "to the data (half of it at least).",
+                            d.rules.seen_gain)},
+      .columns = {{"effect"}, {"parameter"}, {"smallest"}, {"unit"}, {"looks like"}, {"cannot be told because"}}};
   for (const analysis::Detectability& v : d.limits.visible) {
     std::string alike;
     for (const auto& [effect, share] : v.alike)

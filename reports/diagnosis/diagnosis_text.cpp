@@ -24,8 +24,10 @@ Table visibility_lines(const analysis::Diagnosis& d) {
   for (const analysis::Detectability& v : d.limits.visible) {
     std::string remark = v.undecidable;
     if (remark.empty() && !v.alike.empty()) {
-      remark = fmt::format("{:.0f} % like {}", 100 * v.alike.front().second, v.alike.front().first);
-      if (v.alike.size() > 1) remark += fmt::format(", and {} more", v.alike.size() - 1);
+      remark = fmt::format("{} imitates {:.0f} % of it", v.alike.front().first, 100 * v.alike.front().second);
+      if (v.alike.size() > 1)
+        remark += fmt::format("; {} other effect{} more than half", v.alike.size() - 1,
+                              v.alike.size() > 2 ? "s do" : " does");
     }
     const bool seen = v.undecidable.empty() && std::isfinite(v.smallest) && v.smallest > 0;
     table.rows.push_back(

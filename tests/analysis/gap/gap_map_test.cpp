@@ -75,6 +75,103 @@ TEST(GapMap, SeesTrialsThatDifferAsWholes) {
   EXPECT_LT(cell.p_adjusted, 1e-4);
 }
 
+// Twenty events that scatter 2.5 times as much: a sum of squares weighed by its own scatter passes 2.5 at the most.
+TEST(GapMap, SeesALargerSpreadOfFewEvents) {
+  std::mt19937_64 generator(5);
+  std::normal_distribution<double> normal;
+  std::vector<double> y, w;
+  for (std::size_t i = 0; i < 120; ++i) {
+    w.push_back(normal(generator));
+    y.push_back(3 + (i >= 40 && i < 60 ? 1.25 : 0.5) * normal(generator));
+  }
+  const Line model(y, w);
+  const GapMap map = gap_map(model, fit(model, {3, -0.7}, {}), 500, 1);
+  const auto first = std::ranges::min_element(map.cells, {}, &GapCell::p_adjusted);
+  EXPECT_EQ(first->facet, "trial");
+  EXPECT_EQ(first->aspect, "spread");
+  EXPECT_LT(first->p_adjusted, 0.005);
+}
+
+// A third of the trials lies 1.2 errors off: what is shifted scatters no more around its own mean.
+TEST(GapMap, AShiftIsNoLargerSpread) {
+  std::mt19937_64 generator(6);
+  std::normal_distribution<double> normal;
+  std::vector<double> y, w;
+  for (std::size_t i = 0; i < 240; ++i) {
+    w.push_back(normal(generator));
+    y.push_back((i < 40 ? 1.2 : 0.0) + normal(generator));
+  }
+  const Line model(y, w);
+  Fit stated;
+  stated.nuisance = {0, 0};
+  stated.evaluation = model.evaluate(stated.nuisance, {});
+  const GapMap map = gap_map(model, stated, 0, 1);
+  double spread = 0, mean = 0;
+  for (const GapCell& cell : map.cells)
+    if (cell.facet == "trial" && cell.at.starts_with("trial 1 "))
+      (cell.aspect == "spread" ? spread : mean) = cell.statistic;
+  EXPECT_GT(mean, 2.5);
+  EXPECT_LT(spread, 2.5);
+}
+
+// The model has two columns in ten steps of a trial; `together` of the second one's error is that of the first, in this
+// step or the one before.
+class TwoColumns : public Line {
+ public:
+  TwoColumns(double together, int later) : Line({}, {}) {
+    std::mt19937_64 generator(11);
+    std::normal_distribution<double> normal;
+    double before = 0;
+    for (int i = 0; i < 800; ++i) {
+      Event e;
+      e.trial = static_cast<std::size_t>(i / 20);
+      e.number = i % 20 / 2 + 1;
+      e.column = static_cast<std::size_t>(i % 2);
+      const double own = normal(generator), of_first = later == 1 ? before : i > 0 ? y_.back() : 0;
+      if (i % 2 == 1 && later == 1) before = y_.back();
+      e.speed = normal(generator);
+      w_.push_back(e.speed);
+      y_.push_back(i % 2 == 1 ? together * of_first + std::sqrt(1 - together * together) * own : own);
+      events_.push_back(e);
+    }
+  }
+  std::vector<ObservedColumn> columns() const override { return {{"angle", ""}, {"rate", ""}}; }
+};
+
+TEST(GapMap, SeesColumnsThatErrTogether) {
+  for (const int later : {0, 1}) {
+    const TwoColumns model(0.4, later);
+    const GapMap map = gap_map(model, fit(model, {0, 0}, {}), 500, 1);
+    const auto first = std::ranges::min_element(map.cells, {}, &GapCell::p_adjusted);
+    EXPECT_EQ(first->facet, "pair of columns");
+    EXPECT_EQ(first->aspect, "correlation");
+    EXPECT_EQ(first->at, later == 1 ? "angle, then rate a step later" : "angle and rate of one step");
+    EXPECT_NEAR(first->size, 0.4, 0.15);
+    EXPECT_LT(first->p_adjusted, 0.005);
+  }
+}
+
+// Errors with an excess of kurtosis of 3 spread as much everywhere.
+TEST(GapMap, FarErrorsAreNoLargerSpread) {
+  constexpr int sets = 150;
+  int below = 0;
+  for (unsigned seed = 500; seed < 500 + sets; ++seed) {
+    std::mt19937_64 generator(seed);
+    std::normal_distribution<double> normal;
+    std::exponential_distribution<double> mixed(1);
+    std::vector<double> y, w;
+    for (std::size_t i = 0; i < 400; ++i) {
+      w.push_back(normal(generator));
+      y.push_back(3 + 0.5 * std::sqrt(mixed(generator)) * normal(generator));
+    }
+    const Line model(y, w);
+    const GapMap map = gap_map(model, fit(model, {3, -0.7}, {}), 300, 1);
+    below += std::ranges::any_of(map.cells,
+                                 [](const GapCell& cell) { return cell.aspect == "spread" && cell.p_adjusted < 0.05; });
+  }
+  EXPECT_LE(below, 0.05 * sets + 3 * std::sqrt(0.05 * 0.95 * sets));
+}
+
 TEST(GapMap, LevelsAreHonest) {
   constexpr int sets = 150;
   int below = 0;

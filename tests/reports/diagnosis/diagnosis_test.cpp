@@ -194,7 +194,7 @@ TEST(DiagnosisText, SaysTheVerdictFirstAndAnswersEveryQuestion) {
         "on a slope of 8 deg",
         "120 (80 to 170)",
         "What these data could have seen",
-        "70 % like leg_lengths",
+        "leg_lengths imitates 70 % of it",
         "no noise is stated",
         "What missing columns hide",
         "friction_patch",

@@ -114,6 +114,24 @@ TEST(BlindAnswer, VerdictsAreRead) {
             "a.json: verdict: \"perhaps\" is none of no_gap, recalibrate, explained, partly_explained, unexplained");
 }
 
+// A walker's phases are what a wheel's legs are: "phase 2" is one of them, "step" all of its steps.
+TEST(BlindAnswer, PhasesOfWalkersAreLegs) {
+  const analysis::BlindAnswer answer = read_answer("a.json", R"({"verdict":"explained","where":[
+      {"facet":"phase","aspect":"mean","at":"phase 2, half_angle_rad","p_adjusted":0.01},
+      {"facet":"phase","aspect":"mean","at":"step, half_angle_rad","p_adjusted":0.02}],
+      "causes":[],"cause_set":[],"shrinkage":{}})");
+  EXPECT_EQ(answer.where.at(0).facet, "leg");
+  EXPECT_EQ(answer.where.at(1).facet, "phase");
+}
+
+TEST(BlindTruth, WhatIsLeftOfAnOutsideEffectIsSealed) {
+  analysis::BlindTruth truth;
+  truth.slope_deg = analysis::Spread{3, 0.4};
+  EXPECT_FALSE(read_truth("t.json", truth_json(truth, "salt")).left_of_outside);
+  truth.left_of_outside = 12.5;
+  EXPECT_EQ(read_truth("t.json", truth_json(truth, "salt")).left_of_outside, 12.5);
+}
+
 // No alarm in two cases is not enough to say that there are at most 9 % of them.
 TEST(BlindTables, AFewCasesMeetNoBound) {
   analysis::BlindGrades grades;
