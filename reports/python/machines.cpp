@@ -173,7 +173,6 @@ py::dict diagnose_machine(const py::dict& machine_fields, const py::dict& runs_f
     found = analysis::diagnose(model, study);
     figures = notebook_figures(found);
   });
-  found.model.reset();  // its map asks through this call
   return diagnosis_answer(found, {command, "machine: " + machine->name, study.seed, version()}, figures);
 }
 
