@@ -180,7 +180,7 @@ class NominalMap {
   std::vector<double> from_, legs_, values_;
 };
 
-// What the steps say of the legs, where these are called as `called` says.
+// The steps say this of the legs, where these are called as `called` says.
 struct LegDifference {
   Eigen::VectorXd gain;  // [steps] nats by which each speaks for its leg being called as in the file
   double square = 0;     // mean of the difference's square, in the scatter of a step; 0: not known
