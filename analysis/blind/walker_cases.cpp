@@ -88,7 +88,7 @@ WalkDesign draw_walk_design(BlindTruth& truth, const std::set<std::string>& need
   truth.slope_deg =
       Spread{std::round(100 * dice.uniform(2.7, 3.3)) / 100, std::round(1000 * dice.uniform(0.3, 0.46)) / 1000};
   design.truth = {Walker::compass, truth.slope_deg->mean, truth.slope_deg->sd, dynamics::Terrain::fresh};
-  design.options.trials = static_cast<std::size_t>(dice.whole(25, 35));
+  design.options.trials = static_cast<std::size_t>(dice.whole(40, 50));
   design.options.longest = static_cast<std::uint64_t>(dice.whole(9, 12));
   design.options.seed = truth.seed;
   design.options.threads = 1;

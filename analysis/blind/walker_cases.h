@@ -9,7 +9,7 @@
 
 namespace metastable::analysis {
 
-/// Draws case `number` (from 1) of a plan of walkers, as blind_case() does: 25 to 35 trials of 9 to 12 steps. Powers
+/// Draws case `number` (from 1) of a plan of walkers, as blind_case() does: 40 to 50 trials of 9 to 12 steps. Powers
 /// are those of the walkers' own model; that of an effect which no catalogue holds is what it takes from the likelihood
 /// of the model recalibrated to the walks, which stays in truth.left where no other effect is there.
 BlindCase walker_case(const BlindPlan& plan, int number, std::uint64_t seed);

@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <utility>
 #include <vector>
 
 #include "analysis/fitting/bayes_factor.h"
@@ -17,7 +18,10 @@ std::optional<EvenPush> fitted_even_push(const TransitionModel& model, const Fit
   if (!push || !best.fitted()) return {};
   const EffectScan scan = scan_effects(model, recalibrated, {push}, threads);
   if (scan.effects.empty()) return {};
-  const Fit pushed = fit_one_more(model, effort_for(model, recalibrated), recalibrated, scan.effects.front());
+  Fit pushed = fit_one_more(model, effort_for(model, recalibrated), recalibrated, scan.effects.front());
+  // A noise that a recalibration widened to take up the push may hide it; the hypothesis found its way out of that.
+  Fit again = fit(model, best.fit.nuisance, pushed.terms);
+  if (again.penalised > pushed.penalised) pushed = std::move(again);
   EvenPush all{pushed.terms.back().values, 2 * (pushed.penalised - recalibrated.penalised),
                2 * (best.fit.penalised - recalibrated.penalised)};
   all.log_odds = evidence_of_gain(std::max(0.0, all.gain), static_cast<double>(all.by.size()), rules) - best.evidence;

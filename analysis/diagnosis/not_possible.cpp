@@ -80,10 +80,10 @@ std::vector<NotPossible> not_possible(const TransitionModel& model, const Diagno
     all.push_back({"where the gap lies",
                    fmt::format("{:.0f} transitions; a cell of the map takes {}", speeds, least_cell_events),
                    speeds > 0 ? whole(least_cell_events * trials / speeds) : std::nullopt, true});
-  else if (model.legs() > 0 && speeds < least_cell_events * model.legs() && speeds > 0)
-    all.push_back({"which leg the gap lies in",
-                   fmt::format("{:.0f} transitions for {} legs; a cell of the map takes {}", speeds, model.legs(),
-                               least_cell_events),
+  else if (model.legs() > 1 && speeds < least_cell_events * model.legs() && speeds > 0)
+    all.push_back({fmt::format("which {} the gap lies in", model.leg_name()),
+                   fmt::format("{:.0f} transitions for {} {}s; a cell of the map takes {}", speeds, model.legs(),
+                               model.leg_name(), least_cell_events),
                    whole(least_cell_events * model.legs() * trials / speeds), true});
   for (const auto& [id, because] : asked_in_vain(model, options.catalogue))
     all.push_back({fmt::format("whether {} is at work", id), because, {}});

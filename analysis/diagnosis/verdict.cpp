@@ -15,6 +15,7 @@
 #include "analysis/fitting/bayes_factor.h"
 #include "analysis/fitting/cause_ranking.h"
 #include "analysis/gap/facet_evidence.h"
+#include "analysis/gap/fitted_variations.h"
 #include "analysis/gap/gap_map.h"
 
 namespace metastable::analysis {
@@ -53,7 +54,8 @@ struct Joined {
 // Supposes something without a name beside the likeliest hypotheses.
 std::vector<Joined> supposed_beside(const TransitionModel& model, const CauseRanking& ranking,
                                     const std::vector<const RankedCause*>& ordered, const Fit& recalibrated,
-                                    const Rules& rules) {
+                                    const DiagnosisOptions& options) {
+  const Rules& rules = options.rules;
   const double top = ordered.front()->evidence, tolerated = rules.facet_errors * rules.model_error * rules.model_error;
   std::vector<Joined> joined;
   for (const RankedCause* cause : ordered) {
@@ -64,6 +66,10 @@ std::vector<Joined> supposed_beside(const TransitionModel& model, const CauseRan
                 cause->evidence,
                 left_by_facet(model, cause->fit, {tolerated * gained.collisions, tolerated * gained.stances}, rules)};
     for (const EffectTerm& term : cause->terms) one.beside.push_back(term.candidate->id);
+    if (joined.empty())
+      std::ranges::move(variations_beside(model, cause->fit, tolerated * (gained.collisions + gained.stances), rules,
+                                          options.threads, [] {}),
+                        std::back_inserter(one.facets));
     joined.push_back({cause, std::move(one)});
   }
   return joined;
@@ -182,7 +188,7 @@ Chosen choose(const TransitionModel& model, const CauseRanking& ranking, const s
   std::vector<Joined> joined;
   // Few trials cannot show that events scatter as they would by themselves: facets are then not judged.
   if (ranking.scan.trials_suffice) {
-    joined = supposed_beside(model, ranking, ordered, recalibrated, rules);
+    joined = supposed_beside(model, ranking, ordered, recalibrated, options);
     chosen.unnamed = weigh_unnamed(alone, joined, ordered, rules);
   }
   chosen.supposed.push_back(std::move(alone));

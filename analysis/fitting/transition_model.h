@@ -125,6 +125,7 @@ struct Variation {
   std::string facet, aspect;  ///< what it goes by, and what of the contact varies
   Candidate candidate;
   std::vector<std::string> named = {};  ///< effects that go by the same, with as many numbers
+  bool beside = false;                  ///< no effect does such a thing: it is sought beside the likeliest ones, too
 };
 
 /// A hypothesis adds candidates with values.

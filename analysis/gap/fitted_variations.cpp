@@ -25,6 +25,50 @@ LeftInFacet as_left(const Variation& variation, const ScannedEffect& scanned, do
   return left;
 }
 
+// Fits those variations that promise most, and bounds the others by them, as fitted_variations() says.
+// @param sought  the variations of the scan, in its order  @param forgiven  2 Delta log likelihood that counts as none
+std::vector<LeftInFacet> fitted(const TransitionModel& model, const std::vector<const Variation*>& sought,
+                                const Fit& base, const EffectScan& scan, double forgiven, const Rules& rules,
+                                int threads, const std::function<void()>& heartbeat) {
+  if (scan.effects.empty()) return {};
+  const auto left = [&](std::size_t i, double gain) {
+    return as_left(*sought[i], scan.effects[i], std::max(0.0, gain - forgiven), rules);
+  };
+  std::vector<LeftInFacet> all;
+  std::vector<double> promised;
+  for (std::size_t i = 0; i < scan.effects.size(); ++i) {
+    all.push_back(left(i, scan.effects[i].gain[scan.effects[i].best]));
+    promised.push_back(all[i].evidence);
+  }
+  const std::vector<std::size_t> order = falling_order(promised);
+  const Effort effort = effort_for(model, base);
+  const std::function<void()> beat = markov::one_at_a_time(heartbeat);
+  double most = 0, best = 0;
+  std::size_t done = 0;
+  // Where fits keep little of what was promised, others that promised less are fitted, too.
+  for (double least = std::max(0.0, promised[order[0]] - worth_fitting);; least = std::max(0.0, best - worth_fitting)) {
+    std::size_t end = done;
+    while (end < std::min(effort.most_leaders, order.size()) && promised[order[end]] > least) ++end;
+    if (end == done) break;
+    model.side_by_side(end - done, threads, [&](std::size_t i) {
+      beat();
+      const std::size_t which = order[done + i];
+      const Fit kept = fit_one_more(model, effort, base, scan.effects[which], true);
+      all[which] = left(which, 2 * (kept.penalised - base.penalised));
+    });
+    for (; done < end; ++done) {
+      most = std::max(most, all[order[done]].quadratic);
+      best = std::max(best, all[order[done]].evidence);
+    }
+  }
+  for (std::size_t k = done; k < order.size(); ++k) {
+    LeftInFacet& one = all[order[k]];
+    one = left(order[k], std::min(one.quadratic, most) + forgiven);
+    one.evidence = std::min(one.evidence, best);
+  }
+  return all;
+}
+
 }  // namespace
 
 EffectScan scan_variations(const TransitionModel& model, const Fit& recalibrated, int threads) {
@@ -52,38 +96,22 @@ double variations_p_value(const EffectScan& variations, const std::vector<double
 std::vector<LeftInFacet> fitted_variations(const TransitionModel& model, const Fit& recalibrated,
                                            const EffectScan& scan, const Rules& rules, int threads,
                                            const std::function<void()>& heartbeat) {
-  if (scan.effects.empty()) return {};
-  std::vector<LeftInFacet> all;
-  std::vector<double> promised;
-  for (std::size_t i = 0; i < scan.effects.size(); ++i) {
-    const ScannedEffect& scanned = scan.effects[i];
-    all.push_back(as_left(model.variations()[i], scanned, scanned.gain[scanned.best], rules));
-    promised.push_back(all[i].evidence);
-  }
-  const std::vector<std::size_t> order = falling_order(promised);
-  const Effort effort = effort_for(model, recalibrated);
-  const double least = std::max(0.0, all[order[0]].evidence - worth_fitting);
-  std::size_t fitted = 0;
-  while (fitted < std::min(effort.most_leaders, order.size()) && all[order[fitted]].evidence > least) ++fitted;
-  const std::function<void()> beat = markov::one_at_a_time(heartbeat);
-  model.side_by_side(fitted, threads, [&](std::size_t k) {
-    beat();
-    const ScannedEffect& scanned = scan.effects[order[k]];
-    const Fit best = fit_one_more(model, effort, recalibrated, scanned, true);
-    all[order[k]] = as_left(model.variations()[order[k]], scanned,
-                            std::max(0.0, 2 * (best.penalised - recalibrated.penalised)), rules);
-  });
-  double most = 0, best = 0;
-  for (std::size_t k = 0; k < fitted; ++k) {
-    most = std::max(most, all[order[k]].quadratic);
-    best = std::max(best, all[order[k]].evidence);
-  }
-  for (std::size_t k = fitted; k < order.size(); ++k) {
-    LeftInFacet& left = all[order[k]];
-    left = as_left(model.variations()[order[k]], scan.effects[order[k]], std::min(left.quadratic, most), rules);
-    left.evidence = std::min(left.evidence, best);
-  }
-  return all;
+  std::vector<const Variation*> all;
+  for (const Variation& one : model.variations()) all.push_back(&one);
+  return fitted(model, all, recalibrated, scan, 0, rules, threads, heartbeat);
+}
+
+std::vector<LeftInFacet> variations_beside(const TransitionModel& model, const Fit& fit, double forgiven,
+                                           const Rules& rules, int threads, const std::function<void()>& heartbeat) {
+  std::vector<const Variation*> sought;
+  std::vector<const Candidate*> candidates;
+  for (const Variation& one : model.variations())
+    if (one.beside) {
+      sought.push_back(&one);
+      candidates.push_back(&one.candidate);
+    }
+  if (sought.empty()) return {};
+  return fitted(model, sought, fit, scan_effects(model, fit, candidates, threads), forgiven, rules, threads, heartbeat);
 }
 
 }  // namespace metastable::analysis

@@ -34,4 +34,9 @@ std::vector<LeftInFacet> fitted_variations(const TransitionModel& model, const F
                                            const EffectScan& scan, const Rules& rules, int threads,
                                            const std::function<void()>& heartbeat);
 
+/// Says the same of those variations that are sought beside a hypothesis (Variation::beside).
+/// @param forgiven  2 Delta log likelihood that an error of the hypothesis' form may leave to each
+std::vector<LeftInFacet> variations_beside(const TransitionModel& model, const Fit& fit, double forgiven,
+                                           const Rules& rules, int threads, const std::function<void()>& heartbeat);
+
 }  // namespace metastable::analysis

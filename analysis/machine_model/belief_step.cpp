@@ -365,12 +365,12 @@ typename BeliefStep<Most>::Bend BeliefStep<Most>::bend_at(std::size_t trial, con
   return bend;
 }
 
-// Seeks an offset and a score of the lattice that move the state alike in all trials. Where they act through one value,
-// the map bends in their sum: an offset as wide as the noise is no normal belief to it.
+// Seeks a value's offset and a score of the lattice that move the state alike in all trials. Where they act through one
+// value, the map bends in their sum: an offset as wide as the noise is no normal belief to it.
 template <int Most>
 void BeliefStep<Most>::seek_merged(std::span<const TransitionPlace> places, std::span<const Part> beliefs) {
   sought_ = true;
-  const std::size_t axes = lattice_.scores.size(), offsets = stepper_.offsets(), each = 2 * (axes + offsets);
+  const std::size_t axes = lattice_.scores.size(), offsets = stepper_.value_offsets(), each = 2 * (axes + offsets);
   if (axes == 0 || offsets == 0 || stepper_.remembers()) return;
   const Vector still = Vector::Zero(static_cast<Eigen::Index>(stepper_.scores()));
   const auto sd = [&](std::size_t offset) {

@@ -12,7 +12,6 @@
 #include "analysis/machine_model/failure_edges.h"
 #include "analysis/machine_model/machine_stepper.h"
 #include "analysis/machine_model/score_lattice.h"
-#include "analysis/machine_model/score_plan.h"
 
 namespace metastable::analysis {
 

@@ -11,6 +11,7 @@
 #include <string_view>
 #include <utility>
 
+#include "analysis/machine_model/machine_effects.h"
 #include "markov/mesh/joined_steps.h"
 
 namespace metastable::analysis {
@@ -53,7 +54,7 @@ void require_parameter(const MachineParameter& p) {
 
 // These words stand for answers without an effect.
 void require_own_name(const std::string& id) {
-  for (const char* taken : {"no_gap", "recalibration", "none_of_these"})
+  for (const char* taken : {"no_gap", "recalibration", "none_of_these", "even push"})
     if (id == taken)
       throw std::invalid_argument(fmt::format("effects: \"{}\" is a name that answers give to no effect", id));
   require_single_name("effects", id);
@@ -112,10 +113,11 @@ std::vector<std::string> Machine::value_names() const {
   return names;
 }
 
-std::size_t Machine::state_index(const std::string& state) const {
+std::size_t Machine::state_index(const std::string& state, const std::string& where) const {
   const auto at = std::ranges::find(states, state);
   if (at == states.end())
-    throw std::invalid_argument(fmt::format("\"{}\" is none of the states {}", state, fmt::join(states, ", ")));
+    throw std::invalid_argument(
+        fmt::format("{}\"{}\" is none of the states {}", where, state, fmt::join(states, ", ")));
   return static_cast<std::size_t>(at - states.begin());
 }
 
@@ -142,13 +144,18 @@ void Machine::require_valid() const {
     ids.push_back(effect.id);
   }
   require_distinct("effects", ids);
+  const std::vector<std::string> generic = generic_effect_names(*this);
+  for (const std::string& id : ids)
+    if (std::ranges::find(generic, id) != generic.end())
+      throw std::invalid_argument(
+          fmt::format("effects: \"{}\" is the name of an effect that any machine may have: give yours another", id));
   for (const std::string& name : may_vary)
     if (std::ranges::find(parameters, name, &MachineParameter::name) == parameters.end())
       throw std::invalid_argument(fmt::format("may_vary: \"{}\" is none of the parameters", name));
   require_distinct("may_vary", may_vary);
   if (observe.empty()) throw std::invalid_argument("sensor: no state is measured");
   for (const MachineSensor& sensor : observe) {
-    state_index(sensor.state);
+    state_index(sensor.state, "sensor: ");
     observed.push_back(sensor.state);
     if (sensor.sd && !(*sensor.sd >= 0 && std::isfinite(*sensor.sd)))
       throw std::invalid_argument(fmt::format("sensor: {}: the sd {} is not in [0, inf)", sensor.state, *sensor.sd));
@@ -160,7 +167,7 @@ void Machine::require_valid() const {
   }
   require_distinct("sensor", observed);
   for (const MachineLaunch& launch : launches) {
-    state_index(launch.state);
+    state_index(launch.state, "launch: ");
     require_finite("launch: " + launch.state, launch.mean);
     if (!(launch.sd >= 0) || !std::isfinite(launch.sd))
       throw std::invalid_argument(fmt::format("launch: {}: the sd {} is not in [0, inf)", launch.state, launch.sd));
@@ -225,6 +232,8 @@ markov::BatchMap joint_map(const Machine& machine) {
     const std::size_t rows = failed.size();
     std::vector<double> own;
     std::vector<std::vector<double>> by_value(values);
+    own.reserve(rows * scores);
+    for (std::vector<double>& one : by_value) one.reserve(rows);
     for (std::size_t row = 0; row < rows; ++row) {
       const double* here = given.data() + row * (scores + values);
       own.insert(own.end(), here, here + scores);
@@ -241,6 +250,7 @@ markov::BatchMap joint_map(const Machine& machine) {
 void step_jointly(const MachineBatch& batch) {
   const std::size_t scores = batch.scores.size() / batch.rows;
   std::vector<double> given;
+  given.reserve(batch.rows * (scores + batch.values.size()));
   for (std::size_t row = 0; row < batch.rows; ++row) {
     const auto own = batch.scores.subspan(row * scores, scores);
     given.insert(given.end(), own.begin(), own.end());

@@ -98,7 +98,8 @@ struct Machine {
   /// Names what MachineBatch::values holds, in order: parameters, the effects' parameters, inputs.
   std::vector<std::string> value_names() const;
   /// Returns the index of a state. @throws std::invalid_argument for an unknown one, with those there are
-  std::size_t state_index(const std::string& state) const;
+  /// @param where  it was named, in the message: "sensor: "
+  std::size_t state_index(const std::string& state, const std::string& where = "") const;
   /// Returns the launch that somebody stated of a state; nullptr where there is none, or where it is assumed.
   const MachineLaunch* stated_launch(const std::string& state) const;
   /// @throws std::invalid_argument naming the first thing that is wrong, and the range

@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <iterator>
 #include <limits>
 #include <map>
 #include <numbers>
@@ -25,8 +26,11 @@ constexpr std::size_t fewest_jumps = 3, jumps_to_moves = 10;
 // An error of half a column's spread is a quarter of its variance, and makes slopes from there as much too flat. A
 // column that goes far beyond its first values tells the slopes by its later ones.
 constexpr double most_error = 0.5;
-constexpr std::size_t most_codes = 8;    // An input of more values is a number even if all are whole.
-constexpr std::size_t fewest_first = 5;  // So many first values tell a spread.
+constexpr std::size_t most_codes = 8;  // An input of more values is a number even if all are whole.
+// Values this far from both neighbours, in spans of the column, are asked about, and refused: a recorded -999.
+constexpr double far_spans = 3, farthest_spans = 100;
+constexpr std::size_t fewest_to_span = 40;  // So many values tell a column's span.
+constexpr std::size_t fewest_first = 5;     // So many first values tell a spread.
 
 // Fills in means and spreads of the columns.
 void measure_columns(MachineDesign& design, const Machine& machine, const MachineRuns& runs) {
@@ -43,9 +47,25 @@ void measure_columns(MachineDesign& design, const Machine& machine, const Machin
         first += moved;
         second += moved * moved;
       }
-    const double drift = first / std::max(1.0, pairs);
-    design.change.push_back(std::sqrt(std::max(0.0, second / std::max(1.0, pairs) - drift * drift)));
+    const double drift = first / std::max(1.0, pairs), square = second / std::max(1.0, pairs);
+    design.change.push_back(std::sqrt(std::max(0.0, square - drift * drift)));
+    design.usual_change.push_back(std::sqrt(square));
   }
+}
+
+// Correlates a column, over the steps at which it was measured, with the order of trials.
+double along_order(const MachineDesign& design, const MachineRuns& runs, std::size_t sensor) {
+  double count = 0, x = 0, y = 0, xx = 0, yy = 0, xy = 0;
+  for (const StepPlace& at : design.steps) {
+    if (std::isnan(runs.trials[at.trial].rows[static_cast<std::size_t>(at.number) - 1].seen[sensor])) continue;
+    const double run = at.run, seen = at.seen[sensor];
+    ++count;
+    x += run, y += seen;
+    xx += run * run, yy += seen * seen, xy += run * seen;
+  }
+  if (count == 0) return 0;
+  const double square = (xx - x * x / count) * (yy - y * y / count);
+  return square > 0 ? (xy - x * y / count) / std::sqrt(square) : 0;
 }
 
 // Measures the first values of trials that take a step.
@@ -148,6 +168,46 @@ bool same(const MachineTrial& a, const MachineTrial& b) {
 
 }  // namespace
 
+std::vector<std::string> far_values(const Machine& machine, const MachineRuns& runs) {
+  std::vector<std::string> asked;
+  for (std::size_t j = 0; j < machine.observe.size(); ++j) {
+    std::vector<double> values;
+    for (const MachineTrial& trial : runs.trials)
+      for (const MachineRow& row : trial.rows)
+        if (!std::isnan(row.seen[j])) values.push_back(row.seen[j]);
+    if (values.size() < fewest_to_span) continue;
+    std::ranges::sort(values);
+    const std::size_t aside = values.size() / 100 + 1;
+    const double span = values[values.size() - 1 - aside] - values[aside];
+    std::size_t count = 0;
+    double farthest = 0, value = 0;
+    std::string where;
+    for (std::size_t t = 0; t < runs.trials.size(); ++t)
+      for (std::size_t k = 1; k + 1 < runs.trials[t].rows.size(); ++k) {
+        const std::vector<MachineRow>& rows = runs.trials[t].rows;
+        const double to = rows[k].seen[j] - rows[k - 1].seen[j], from = rows[k].seen[j] - rows[k + 1].seen[j];
+        if (!(to * from > 0) || !(std::min(std::abs(to), std::abs(from)) > far_spans * span)) continue;
+        ++count;
+        if (!(std::abs(to) > farthest)) continue;
+        farthest = std::abs(to);
+        value = rows[k].seen[j];
+        where = fmt::format("trial {}, row {}", runs.name_of(t), k + 1);
+      }
+    if (count == 0 || !(span > 0)) continue;
+    const std::string is = fmt::format("{} is {:g} in {}", machine.observe[j].state, value, where);
+    if (farthest > farthest_spans * span)
+      throw std::invalid_argument(
+          fmt::format("{}, more than {:g} times as far from the row before as the column "
+                      "spans otherwise: give NaN for a value that is missing",
+                      is, farthest_spans));
+    asked.push_back(
+        fmt::format("{}{}, far from the rows before and behind: is it a glitch of the sensor? Give NaN "
+                    "there; else it may pass for outliers of a noise",
+                    is, count > 1 ? fmt::format(" (one of {} such rows)", count) : ""));
+  }
+  return asked;
+}
+
 std::vector<std::string> wrapping_columns(const Machine& machine, const MachineRuns& runs) {
   constexpr std::array<std::pair<double, const char*>, 2> turns{
       {{2 * std::numbers::pi, "2 pi"}, {360.0, "360 degrees"}}};
@@ -205,6 +265,7 @@ MachineDesign machine_design(const Machine& machine, const MachineRuns& runs) {
             std::isnan(row.seen[j]) || !(design.sd[j] > 0) ? 0 : (row.seen[j] - design.mean[j]) / design.sd[j]);
       design.steps.push_back(std::move(place));
     }
+  for (std::size_t j = 0; j < machine.observe.size(); ++j) design.along_order.push_back(along_order(design, runs, j));
   measure_inputs(design, machine, runs);
   return design;
 }
@@ -232,6 +293,13 @@ std::vector<std::string> doubled_trials(const MachineRuns& runs) {
   if (doubled == 0) return {};
   return {fmt::format("{} of {} trials are there twice, number by number: was one set of data brought in twice?",
                       doubled, runs.trials.size())};
+}
+
+std::vector<std::string> questions_on_values(const Machine& machine, const MachineRuns& runs) {
+  std::vector<std::string> asked = wrapping_columns(machine, runs);
+  std::ranges::copy(far_values(machine, runs), std::back_inserter(asked));
+  if (std::string question = unseen_launches(machine, runs); !question.empty()) asked.push_back(std::move(question));
+  return asked;
 }
 
 }  // namespace metastable::analysis

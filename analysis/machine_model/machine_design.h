@@ -51,7 +51,9 @@ struct MachineDesign {
   double first_position = 0, last_position = 0;         ///< [m]
   std::vector<double> mean, sd;                         ///< by sensor, of its column
   std::vector<double> change;                           ///< by sensor: sd of its change from row to row
-  std::vector<FirstValues> first;                       ///< by sensor
+  std::vector<double> usual_change;                     ///< by sensor: root mean square of that change
+  std::vector<double> along_order;  ///< by sensor: correlation of its column with the order of trials
+  std::vector<FirstValues> first;   ///< by sensor
   std::vector<InputCourse> inputs;
 };
 
@@ -65,6 +67,11 @@ std::string replayed_inputs(const Machine& machine, const MachineDesign& design)
 /// Asks, in a sentence, about trials that are there twice, number by number. Empty: there are none.
 std::vector<std::string> doubled_trials(const MachineRuns& runs);
 
+/// Asks, in a sentence for each sensor, about values that lie far from the rows before and behind them: beyond three
+/// times what the column spans between its percents 1 and 99.
+/// @throws std::invalid_argument where one lies beyond a hundred times that
+std::vector<std::string> far_values(const Machine& machine, const MachineRuns& runs);
+
 /// Asks, in a sentence each, about sensors whose values seem to wrap: they stay within a turn (2 pi, or 360) and jump
 /// by about one from row to row. Slopes of the map across such a jump are wrong.
 std::vector<std::string> wrapping_columns(const Machine& machine, const MachineRuns& runs);
@@ -72,6 +79,9 @@ std::vector<std::string> wrapping_columns(const Machine& machine, const MachineR
 /// Asks, in a sentence, for launches that are neither stated nor seen: the first values of trials scatter little beyond
 /// the error of their sensor. Trials would be taken to begin where that error put them. Empty: there are none.
 std::string unseen_launches(const Machine& machine, const MachineRuns& runs);
+
+/// Asks all of these about the measured values, but that of doubled trials.
+std::vector<std::string> questions_on_values(const Machine& machine, const MachineRuns& runs);
 
 /// Returns a number for every step.
 template <class Of>

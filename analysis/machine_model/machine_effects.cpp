@@ -23,6 +23,9 @@ constexpr std::size_t fewest_trials = 5;  // whose spread is told
 constexpr std::size_t most_waves = 512, fewest_waves = 128;
 constexpr double waves_apart = 0.5;
 constexpr int stretches = 6;  // of the way
+// A drift is not told from what changes with a state whose column keeps less than a tenth of its variance beside the
+// order of trials.
+constexpr double most_along_order = 0.95;
 constexpr long much_rarer =
     2;  // The second of two values is named where the first has more than so many times its steps.
 constexpr double largest_memory = 0.9, all_noises = -1;
@@ -75,17 +78,19 @@ std::function<std::vector<NamedValue>(const Values&, const Values&)> changed_in(
 // The effects in which one parameter of the machine varies.
 class Varying {
  public:
-  Varying(const MachineParameter& parameter, std::size_t value, std::shared_ptr<const MachineDesign> design)
-      : parameter_(parameter),
+  Varying(const Machine& machine, const MachineParameter& parameter, std::size_t value,
+          std::shared_ptr<const MachineDesign> design)
+      : machine_(machine),
+        parameter_(parameter),
         value_(value),
         shared_(std::move(design)),
         design_(*shared_),
         range_(range_of(parameter)) {}
 
-  std::vector<MachineCandidate> all(const Machine& machine) const {
-    const std::size_t waves = std::max(fewest_waves, most_waves / machine.may_vary.size());
+  std::vector<MachineCandidate> all() const {
+    const std::size_t waves = std::max(fewest_waves, most_waves / machine_.may_vary.size());
     std::vector<MachineCandidate> list{by_phase(), drift(), spread(), clock(waves), stretch()};
-    for (std::size_t j = 0; j < machine.observe.size(); ++j) list.push_back(with_state(machine, j));
+    for (std::size_t j = 0; j < machine_.observe.size(); ++j) list.push_back(with_state(j));
     for (std::size_t l = 0; l < design_.labels.size(); ++l) list.push_back(by_label(l));
     return list;
   }
@@ -145,6 +150,12 @@ class Varying {
     one.candidate.parameters = {change()};
     one.candidate.report = reporting({}, {"change_over_the_runs"});
     if (design_.trials < 3) one.candidate.undecidable = "a drift over the runs takes three trials";
+    for (std::size_t j = 0; j < design_.along_order.size(); ++j)
+      if (std::abs(design_.along_order[j]) > most_along_order)
+        one.candidate.undecidable = fmt::format(
+            "the order of trials goes with {} (correlation {:.2f}), as where one long run was cut into trials: what "
+            "changes with the one would be called a drift",
+            machine_.observe[j].state, design_.along_order[j]);
     one.apply = adding([](const StepPlace& at, const Values&, std::size_t) { return at.run; });
     return one;
   }
@@ -209,12 +220,12 @@ class Varying {
     });
     return one;
   }
-  MachineCandidate with_state(const Machine& machine, std::size_t sensor) const {
-    MachineCandidate one = named("_with_" + machine.observe[sensor].state);
+  MachineCandidate with_state(std::size_t sensor) const {
+    MachineCandidate one = named("_with_" + machine_.observe[sensor].state);
     one.candidate.parameters = {change()};
     one.candidate.report = reporting({}, {"change_a_sd_of_the_state"});
     const double sd = design_.sd[sensor] > 0 ? design_.sd[sensor] : 1;
-    one.apply = [value = value_, state = machine.state_index(machine.observe[sensor].state), sd,
+    one.apply = [value = value_, state = machine_.state_index(machine_.observe[sensor].state), sd,
                  mean = design_.mean[sensor]](MachineHypothesis& h, const Values&, const Values& v) {
       h.laws.push_back({value, state, v[0] / sd, mean});
     };
@@ -236,6 +247,7 @@ class Varying {
     return one;
   }
 
+  const Machine& machine_;
   const MachineParameter& parameter_;
   std::size_t value_;
   std::shared_ptr<const MachineDesign> shared_;
@@ -273,6 +285,9 @@ MachineCandidate lag(const Machine& machine, const MachineDesign& design, std::s
   one.candidate.parameters = {{0, 0, longest_lag, fine_step * longest_lag}};
   one.candidate.seek_far = true;
   one.candidate.report = reporting({}, {"steps"});
+  if (design.inputs[input].code)
+    one.candidate.undecidable =
+        machine.inputs[input] + " has few values, all whole, and is taken for a code: a hundredth of it is not";
   if (!design.inputs[input].changes) one.candidate.undecidable = machine.inputs[input] + " changes within no trial";
   one.apply = [input, inputs = machine.inputs.size()](MachineHypothesis& h, const Values&, const Values& v) {
     h.lag.resize(inputs);
@@ -414,11 +429,11 @@ std::vector<MachineCandidate> machine_effects(const Machine& machine, std::share
   }
   for (std::size_t p = 0; p < machine.parameters.size(); ++p) {
     if (std::ranges::find(machine.may_vary, machine.parameters[p].name) == machine.may_vary.end()) continue;
-    for (MachineCandidate& one : Varying(machine.parameters[p], p, design).all(machine)) all.push_back(std::move(one));
+    for (MachineCandidate& one : Varying(machine, machine.parameters[p], p, design).all())
+      all.push_back(std::move(one));
   }
   all.push_back(memory(machine));
-  for (std::size_t i = 0; i < machine.inputs.size(); ++i)
-    if (!design->inputs[i].code) all.push_back(lag(machine, *design, i));
+  for (std::size_t i = 0; i < machine.inputs.size(); ++i) all.push_back(lag(machine, *design, i));
   all.push_back(outliers());
   for (std::size_t j = 0; j < machine.observe.size(); ++j) all.push_back(sensor_noise(machine, *design, j));
   for (std::size_t j = 0; j < machine.observe.size(); ++j) all.push_back(sensor_bias(machine, *design, j));
@@ -430,6 +445,18 @@ std::vector<MachineCandidate> machine_effects(const Machine& machine, std::share
     all.push_back(launch_spread(machine, *design, s));
   }
   return all;
+}
+
+std::vector<std::string> generic_effect_names(const Machine& machine) {
+  std::vector<std::string> names{"memory", "outliers"};
+  for (const std::string& input : machine.inputs) names.push_back("lag_" + input);
+  for (const std::string& state : machine.states)
+    for (const char* of : {"sensor_noise_", "sensor_bias_", "launch_", "launch_spread_"}) names.push_back(of + state);
+  for (const std::string& varying : machine.may_vary) {
+    for (const char* how : {"_by_phase", "_drift", "_spread", "_clock", "_stretch"}) names.push_back(varying + how);
+    for (const std::string& state : machine.states) names.push_back(fmt::format("{}_with_{}", varying, state));
+  }
+  return names;
 }
 
 std::string machine_effect_unit(const Machine& machine, const std::string& effect, const std::string& parameter) {

@@ -26,6 +26,10 @@ struct MachineCandidate {
 /// cannot show say why.
 std::vector<MachineCandidate> machine_effects(const Machine& machine, std::shared_ptr<const MachineDesign> design);
 
+/// Names the effects that a machine with these parameters, states and inputs may have whatever its runs are: those of
+/// machine_effects() that its user does not suspect, but for q_by_LABEL.
+std::vector<std::string> generic_effect_names(const Machine& machine);
+
 /// Returns the unit of a parameter that such an effect reports, by Machine::unit_of() of what the effect changes; ""
 /// for a ratio, a share and a number of steps.
 std::string machine_effect_unit(const Machine& machine, const std::string& effect, const std::string& parameter);

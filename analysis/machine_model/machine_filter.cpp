@@ -128,12 +128,12 @@ typename BeliefMixture<Most>::Part Follower<Most>::launched(const MachineRow& ro
     belief.mean[s] = at.mean;
     belief.covariance(s, s) = at.sd * at.sd;
   }
-  for (std::size_t i = 0; i < supposed_.spreads.size(); ++i) {
-    const auto at = states + static_cast<Eigen::Index>(i);
-    belief.covariance(at, at) = supposed_.spreads[i].sd * supposed_.spreads[i].sd;
+  Eigen::Index offset = states;
+  for (const double sd : supposed_.offset_sds()) {
+    belief.covariance(offset, offset) = sd * sd;
+    ++offset;
   }
-  for (Eigen::Index m = states + static_cast<Eigen::Index>(supposed_.spreads.size()); m < size; ++m)
-    belief.covariance(m, m) = 1;
+  for (Eigen::Index m = offset; m < size; ++m) belief.covariance(m, m) = 1;
   for (std::size_t j = 0; j < state_.size(); ++j) {
     const Eigen::Index s = state_[j];
     if (shared_[j] >= 0) belief.covariance(size + shared_[j], size + shared_[j]) = 1;
@@ -370,7 +370,7 @@ std::vector<Event> machine_events(const Machine& machine, const MachineRuns& run
 Evaluation follow_machine(const Machine& machine, const MachineRuns& runs, const ScorePlan& plan,
                           const std::vector<Event>& events, const MachineHypothesis& supposed,
                           std::vector<double>* chances) {
-  std::size_t size = machine.states.size() + supposed.spreads.size() + static_cast<std::size_t>(machine.scores);
+  std::size_t size = machine.states.size() + supposed.offset_sds().size() + static_cast<std::size_t>(machine.scores);
   if (!supposed.memory.empty()) size += static_cast<std::size_t>(machine.scores);
   for (const MachineSensor& sensor : machine.observe) size += sensor.correlation != 0 ? 2 : 0;
   size += static_cast<std::size_t>(bent_numbers(machine, plan));

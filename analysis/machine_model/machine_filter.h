@@ -8,7 +8,7 @@
 #include "analysis/machine_model/machine.h"
 #include "analysis/machine_model/machine_hypothesis.h"
 #include "analysis/machine_model/machine_runs.h"
-#include "analysis/machine_model/score_plan.h"
+#include "analysis/machine_model/score_lattice.h"
 
 namespace metastable::analysis {
 

@@ -9,8 +9,8 @@ namespace {
 // Says whether a hypothesis has nothing but values, sensors and what adds to single transitions.
 bool only_adds(const MachineHypothesis& h, const MachineHypothesis& plain) {
   return h.values == plain.values && h.sensor_sd == plain.sensor_sd && h.wild == plain.wild && h.laws.empty() &&
-         h.spreads.empty() && h.memory.empty() && h.added_noise.empty() && h.bias.empty() && h.launch_offset.empty() &&
-         h.launch_scatter.empty() && h.lag.empty() && h.outliers == 0;
+         h.spreads.empty() && h.push_spreads.empty() && h.memory.empty() && h.added_noise.empty() && h.bias.empty() &&
+         h.launch_offset.empty() && h.launch_scatter.empty() && h.lag.empty() && h.outliers == 0;
 }
 
 std::vector<double> per(double step, std::vector<double> transition) {
@@ -19,6 +19,13 @@ std::vector<double> per(double step, std::vector<double> transition) {
 }
 
 }  // namespace
+
+std::vector<double> MachineHypothesis::offset_sds() const {
+  std::vector<double> all;
+  for (const Spread& one : spreads) all.push_back(one.sd);
+  for (const PushSpread& one : push_spreads) all.push_back(one.sd);
+  return all;
+}
 
 NormalLaunch supposed_launch(const MachineHypothesis& hypothesis, const MachineLaunch& launch, std::size_t state) {
   NormalLaunch at{launch.mean, launch.sd};

@@ -36,11 +36,19 @@ struct MachineHypothesis {
     std::vector<double> transition;  // added
   };
 
+  /// A state that is pushed after each step by a weight times a number that differs from trial to trial.
+  struct PushSpread {
+    std::size_t state;
+    double sd;                       // of that number
+    std::vector<double> transition;  // weights
+  };
+
   std::vector<double> values;  ///< parameters and the effects' parameters
   std::vector<Change> changes = {};
   std::vector<StateLaw> laws = {};
   std::vector<Spread> spreads = {};
   std::vector<Push> pushes = {};
+  std::vector<PushSpread> push_spreads = {};
   std::vector<double> scatter = {};         ///< by transition: scores are so many times as large; empty: 1
   std::vector<double> memory = {};          ///< by score: correlation with the one before; empty: 0
   std::vector<double> sensor_sd = {};       ///< by sensor
@@ -51,6 +59,9 @@ struct MachineHypothesis {
   std::vector<double> lag = {};             ///< by input [steps]: what acts is what was recorded so long before
   double outliers = 0;                      ///< share of steps whose scores are drawn wide
   double wild = 0;                          ///< share of rows that say nothing of the state
+
+  /// Lists the sds of what differs from trial to trial: of values first, then of pushes.
+  std::vector<double> offset_sds() const;
 };
 
 /// The mean and the sd of a state's launches.

@@ -158,8 +158,8 @@ Walking Walker::launched(std::size_t trial, MachineRow& first) const {
     point = row.seen[j] - off;
   }
   Eigen::Index at = static_cast<Eigen::Index>(stepper_.states());
-  for (std::size_t i = 0; i < supposed_.spreads.size(); ++i, ++at)
-    walking.point[at] = supposed_.spreads[i].sd * draws.normal(0, offsets + i);
+  const std::vector<double> sds = supposed_.offset_sds();
+  for (std::size_t i = 0; i < sds.size(); ++i, ++at) walking.point[at] = sds[i] * draws.normal(0, offsets + i);
   for (std::size_t m = 0; at < walking.point.size(); ++at, ++m) walking.point[at] = draws.normal(0, scores + m);
   return walking;
 }

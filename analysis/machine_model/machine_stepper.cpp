@@ -43,6 +43,7 @@ void MachineStepper::clear() {
   places_.clear();
   states_.clear();
   scores_.clear();
+  pushed_.clear();
   next_.clear();
   failed_.clear();
   for (std::vector<double>& one : values_) one.clear();
@@ -102,6 +103,9 @@ void MachineStepper::add_straight(const TransitionPlace& place, const Eigen::Ref
       z = kept * point[static_cast<Eigen::Index>(states() + offsets()) + at] + std::sqrt(1 - kept * kept) * z;
     scores_.push_back(scatter * z);
   }
+  for (std::size_t i = 0; i < supposed_.push_spreads.size(); ++i)
+    pushed_.push_back(supposed_.push_spreads[i].transition[place.number] *
+                      point[static_cast<Eigen::Index>(states() + value_offsets() + i)]);
   for (std::size_t v = 0; v < lower_.size(); ++v)
     if (varies_[v]) values_[v].push_back(value_at(v, place, point));
   for (std::size_t i = 0; i < machine_.inputs.size(); ++i)
@@ -117,6 +121,9 @@ void MachineStepper::take(std::size_t point, std::span<const double> next, std::
   if (!std::ranges::all_of(next, [](double x) { return std::isfinite(x); })) failed_[point] = lost_mark;
   for (const auto& push : supposed_.pushes)
     next_[point * states() + push.state] += push.transition[places_[point].number];
+  const std::size_t count = supposed_.push_spreads.size();
+  for (std::size_t i = 0; i < count; ++i)
+    next_[point * states() + supposed_.push_spreads[i].state] += pushed_[point * count + i];
 }
 
 void MachineStepper::run() {

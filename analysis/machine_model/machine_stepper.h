@@ -38,10 +38,13 @@ class MachineStepper {
 
   std::size_t states() const { return machine_.states.size(); }
   std::size_t scores() const { return static_cast<std::size_t>(machine_.scores); }
-  std::size_t offsets() const { return supposed_.spreads.size(); }
+  std::size_t offsets() const { return supposed_.spreads.size() + supposed_.push_spreads.size(); }
+  /// Counts the offsets of values, which come before those of pushes.
+  std::size_t value_offsets() const { return supposed_.spreads.size(); }
   bool remembers() const { return !supposed_.memory.empty(); }
   double memory(std::size_t score) const { return remembers() ? supposed_.memory[score] : 0; }
-  /// Counts what a point holds: states, then offsets of values, then the scores before, where these are remembered.
+  /// Counts what a point holds: states, then the offsets of values and of pushes, then the scores before, where these
+  /// are remembered.
   std::size_t size() const { return states() + offsets() + (remembers() ? scores() : 0); }
 
   /// Returns one of the same machine, runs and hypothesis without a point.
@@ -78,6 +81,7 @@ class MachineStepper {
   std::vector<double> lower_, upper_;  // of the values
   std::vector<char> varies_;           // by value: differs from row to row
   std::vector<double> states_, scores_, next_;
+  std::vector<double> pushed_;               // by point and PushSpread: what its state is pushed by
   std::vector<std::vector<double>> values_;  // by value
   std::vector<std::uint8_t> failed_;
   std::vector<TransitionPlace> places_;

@@ -7,6 +7,7 @@
 #include <cmath>
 #include <deque>
 #include <functional>
+#include <iterator>
 #include <limits>
 #include <mutex>
 #include <set>
@@ -119,14 +120,11 @@ class MachineTransitions : public TransitionModel {
         machine_(machine->dear ? std::make_shared<Machine>(joining_steps(machine)) : machine),
         runs_(std::move(runs)) {
     notes_ = look_over(*machine_, runs_);
-    for (std::string& question : wrapping_columns(*machine_, runs_)) notes_.push_back(std::move(question));
-    if (std::string question = unseen_launches(*machine_, runs_); !question.empty())
-      notes_.push_back(std::move(question));
+    std::ranges::copy(questions_on_values(*machine_, runs_), std::back_inserter(notes_));
     design_ = std::make_shared<MachineDesign>(machine_design(*machine_, runs_));
     set_up_nuisances();
     plan_ = score_plan(*machine_, runs_, hypothesis(nominal_values(*this), {}));
-    if (plan_.others_fail)
-      notes_.push_back("more than two noises lead to failure: its chance leaves out all but two of them");
+    std::ranges::copy(plan_.notes, std::back_inserter(notes_));
     set_up_effects();
     list_events();
     require_noise();

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <iterator>
 #include <numbers>
 #include <string>
 #include <utility>
@@ -12,10 +13,17 @@ namespace {
 using Values = std::vector<double>;
 using Weight = std::function<double(const StepPlace&, std::size_t parameter)>;
 
-constexpr double largest_push = 1;     // in sds of a column's change from row to row
+// Pushes are at most so many of a column's usual changes from row to row. One that is the same at every step may be
+// most of what a machine does, as the loss of a drum that coasts down.
+constexpr double largest_push = 1, largest_even_push = 3;
 constexpr double largest_scatter = 1;  // of the logarithm of the scores' spread
 constexpr double step = 1e-3;
-constexpr int waves = 3;  // along the way, and over the runs
+constexpr std::size_t fewest_swinging = 5;  // trials, whose own swings are told
+constexpr int waves = 3;                    // along the way, and over the runs
+
+// Something swings: frequencies are tried so far apart [cycles a step], below the fastest that steps can show. What a
+// launch sets swinging comes to rest within about so many steps.
+constexpr double swings_apart = 0.05, fastest_swing = 0.475, steps_of_a_swing = 10;
 
 // Something that a step may go by, with a number for each of its parameters.
 struct Facet {
@@ -87,6 +95,16 @@ MachineVariation variation(const Facet& facet, const std::string& aspect, double
   return one;
 }
 
+double usual_change(const MachineDesign& design, std::size_t sensor) {
+  return design.usual_change[sensor] > 0 ? design.usual_change[sensor] : 1;
+}
+
+std::vector<std::size_t> observed_states(const Machine& machine) {
+  std::vector<std::size_t> states;
+  for (const MachineSensor& sensor : machine.observe) states.push_back(machine.state_index(sensor.state));
+  return states;
+}
+
 std::vector<double> summed(const MachineDesign& design, const Facet& facet, const Values& v) {
   return by_step(design, [&](const StepPlace& at) {
     double sum = 0;
@@ -96,13 +114,65 @@ std::vector<double> summed(const MachineDesign& design, const Facet& facet, cons
   });
 }
 
+// Returns a swing of some cycles a step: its cosine and its sine.
+double swing(const StepPlace& at, double cycles, std::size_t part) {
+  const double angle = 2 * std::numbers::pi * cycles * at.number;
+  return part == 0 ? std::cos(angle) : std::sin(angle);
+}
+
+// Something swings with a frequency, which is the entry of its variant, and no effect does.
+void let_swing(Variation& one) {
+  one.beside = true;
+  one.candidate.variants.clear();
+  for (double cycles = swings_apart; cycles < fastest_swing; cycles += swings_apart)
+    one.candidate.variants.push_back({cycles});
+  one.candidate.refine = {swings_apart};
+}
+
+// What every launch sets swinging alike pushes all states that are measured.
+MachineVariation swing_from_launch(const Machine& machine, std::shared_ptr<const MachineDesign> design) {
+  MachineVariation one = even_push(machine, design);
+  one.variation.facet = "swing from the launch";
+  one.variation.aspect = "mean";
+  one.variation.candidate.id = "swing from the launch";
+  const std::vector<FreeParameter> parts = one.variation.candidate.parameters;
+  std::ranges::copy(parts, std::back_inserter(one.variation.candidate.parameters));
+  let_swing(one.variation);
+  one.apply = [design, states = observed_states(machine)](MachineHypothesis& h, const Values& variant,
+                                                          const Values& v) {
+    for (std::size_t j = 0; j < states.size(); ++j)
+      h.pushes.push_back({states[j], by_step(*design, [&](const StepPlace& at) {
+                            return std::exp(-at.number / steps_of_a_swing) *
+                                   (v[j] * swing(at, variant[0], 0) + v[states.size() + j] * swing(at, variant[0], 1));
+                          })});
+  };
+  return one;
+}
+
+// Something that swings on from a phase of its own in each trial pushes a state.
+MachineVariation swing_in_trial(const Machine& machine, std::shared_ptr<const MachineDesign> design, std::size_t sensor,
+                                double most) {
+  const std::string& name = machine.observe[sensor].state;
+  MachineVariation one = variation({"swing in each trial", 1, {}}, "mean " + name, most);
+  one.variation.candidate.parameters = {{0, 0, most * most, 1e-6 * most * most, 1e-2 * most * most}};
+  let_swing(one.variation);
+  one.apply = [design, state = machine.state_index(name)](MachineHypothesis& h, const Values& variant,
+                                                          const Values& v) {
+    if (!(v[0] > 0)) return;
+    for (const std::size_t part : {0, 1})
+      h.push_spreads.push_back(
+          {state, std::sqrt(v[0]), by_step(*design, [&](const StepPlace& at) { return swing(at, variant[0], part); })});
+  };
+  return one;
+}
+
 }  // namespace
 
 std::vector<MachineVariation> machine_variations(const Machine& machine, std::shared_ptr<const MachineDesign> design) {
   std::vector<MachineVariation> all;
   for (const Facet& facet : facets(machine, *design)) {
     for (std::size_t j = 0; j < machine.observe.size(); ++j) {
-      const double most = largest_push * (design->change[j] > 0 ? design->change[j] : 1);
+      const double most = largest_push * usual_change(*design, j);
       MachineVariation one = variation(facet, "mean " + machine.observe[j].state, most);
       one.apply = [design, facet, state = machine.state_index(machine.observe[j].state)](
                       MachineHypothesis& h, const Values&, const Values& v) {
@@ -118,19 +188,21 @@ std::vector<MachineVariation> machine_variations(const Machine& machine, std::sh
     };
     all.push_back(std::move(one));
   }
+  all.push_back(swing_from_launch(machine, design));
+  for (std::size_t j = 0; design->trials >= fewest_swinging && j < machine.observe.size(); ++j)
+    all.push_back(swing_in_trial(machine, design, j, largest_push * usual_change(*design, j)));
   return all;
 }
 
 MachineVariation even_push(const Machine& machine, std::shared_ptr<const MachineDesign> design) {
   MachineVariation one;
   one.variation.candidate.id = "even push";
-  std::vector<std::size_t> states;
   for (std::size_t j = 0; j < machine.observe.size(); ++j) {
-    const double most = largest_push * (design->change[j] > 0 ? design->change[j] : 1);
+    const double most = largest_even_push * usual_change(*design, j);
     one.variation.candidate.parameters.push_back({0, -most, most, step * most});
-    states.push_back(machine.state_index(machine.observe[j].state));
   }
-  one.apply = [states, steps = design->steps.size()](MachineHypothesis& h, const Values&, const Values& v) {
+  one.apply = [states = observed_states(machine), steps = design->steps.size()](MachineHypothesis& h, const Values&,
+                                                                                const Values& v) {
     for (std::size_t j = 0; j < states.size(); ++j) h.pushes.push_back({states[j], Values(steps, v[j])});
   };
   return one;

@@ -13,7 +13,7 @@
 #include "analysis/experiment/experiment_toml.h"
 #include "analysis/experiment/suggestion.h"
 #include "analysis/machine_model/machine_transitions.h"
-#include "analysis/machine_model/score_plan.h"
+#include "analysis/machine_model/score_lattice.h"
 #include "analysis/statistics/random.h"
 #include "analysis/walker_model/leg_turns.h"
 #include "analysis/walker_model/step_least_squares.h"

@@ -16,7 +16,7 @@ namespace metastable::reports::python {
 namespace {
 
 [[noreturn]] void wrong_kind(const char* name, const char* wanted, const py::handle& value) {
-  throw py::type_error(
+  throw WrongKind(
       fmt::format("{}: {} expected, not {}", name, wanted, std::string(py::str(py::type::of(value).attr("__name__")))));
 }
 

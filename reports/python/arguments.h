@@ -6,6 +6,7 @@
 
 #include <cstdint>
 #include <initializer_list>
+#include <stdexcept>
 #include <string>
 #include <utility>
 #include <vector>
@@ -20,7 +21,12 @@ namespace metastable::reports::python {
 
 namespace py = pybind11;
 
-/// Holds arguments by name; None stands for one that is not given. Everything throws py::type_error naming the argument
+/// An argument, or what a function of the user's returned, is of the wrong kind: Python's InputTypeError.
+class WrongKind : public std::invalid_argument {
+  using std::invalid_argument::invalid_argument;
+};
+
+/// Holds arguments by name; None stands for one that is not given. Everything throws WrongKind naming the argument
 /// where it is of the wrong kind, and std::invalid_argument where it is out of range.
 class Arguments {
  public:

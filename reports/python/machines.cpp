@@ -1,6 +1,7 @@
 // Binds machines that are brought in Python: a step map with names, and runs of the real one.
 
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 
 #include <map>
 #include <memory>
@@ -53,10 +54,10 @@ void require_untouched(const py::dict& values, const std::vector<std::string>& n
                        const std::vector<py::object>& given) {
   for (std::size_t v = 0; v < names.size(); ++v)
     if (!values.contains(names[v].c_str()) || !py::object(values[names[v].c_str()]).is(given[v]))
-      throw py::value_error(
+      throw std::invalid_argument(
           fmt::format("step: it writes into p, whose \"{}\" is not what it was given any more", names[v]));
   if (values.size() != names.size())
-    throw py::value_error("step: it writes into p, which has names that it was not given");
+    throw std::invalid_argument("step: it writes into p, which has names that it was not given");
 }
 
 // Asks the step map of a machine, with its values by name.
@@ -74,8 +75,16 @@ void ask_step(const py::object& step, const std::vector<std::string>& names, con
     }
     values[names[v].c_str()] = given.back();
   }
-  const py::object returned =
-      call_step([&] { return step(rows_of(batch.states, batch.rows), rows_of(batch.scores, batch.rows), values); });
+  const py::object returned = call_step([&]() -> py::object {
+    try {
+      return step(rows_of(batch.states, batch.rows), rows_of(batch.scores, batch.rows), values);
+    } catch (py::error_already_set& error) {
+      if (!error.matches(PyExc_KeyError)) throw;
+      raise_instead(error, "InputError",
+                    fmt::format("step: it asks a dict for {}, which is not there; p has {}",
+                                std::string(py::str(error.value())), fmt::join(names, ", ")));
+    }
+  });
   require_untouched(values, names, given);
   take_step(returned, batch.rows, batch.next, batch.failed);
 }

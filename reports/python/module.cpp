@@ -48,6 +48,8 @@ void translate(std::exception_ptr thrown) {
     throw;
   } catch (const py::builtin_exception&) {
     throw;
+  } catch (const WrongKind& error) {
+    raise("InputTypeError", error.what());
   } catch (const analysis::InputError& error) {
     raise("InputError", error.what());
   } catch (const std::invalid_argument& error) {

@@ -4,14 +4,17 @@
 
 #include <algorithm>
 #include <cstring>
+#include <stdexcept>
 #include <string>
+
+#include "reports/python/arguments.h"
 
 namespace metastable::reports::python {
 namespace {
 
 std::string shape_of(const py::array& array) { return py::str(array.attr("shape")).cast<std::string>(); }
 
-[[noreturn]] void refuse(const std::string& what) { throw py::type_error("step: " + what); }
+[[noreturn]] void refuse(const std::string& what) { throw WrongKind("step: " + what); }
 
 // Copies what `step` returned for the next states.
 void take_next(const py::object& returned, std::size_t rows, std::span<double> next) {
@@ -25,7 +28,7 @@ void take_next(const py::object& returned, std::size_t rows, std::span<double> n
   const bool full = array.ndim() == 2 && static_cast<std::size_t>(array.shape(0)) == rows &&
                     static_cast<std::size_t>(array.shape(1)) == dimension;
   if (!flat && !full)
-    throw py::value_error(
+    throw std::invalid_argument(
         fmt::format("step: next states of shape {}, ({}, {}) expected", shape_of(array), rows, dimension));
   const py::array_t<double, py::array::c_style | py::array::forcecast> numbers(array);
   std::memcpy(next.data(), numbers.data(), next.size_bytes());
@@ -38,7 +41,8 @@ void take_failed(const py::object& returned, std::span<std::uint8_t> failed) {
                        array ? "of dtype " + py::str(array.dtype()).cast<std::string>()
                              : std::string(py::str(py::type::of(returned).attr("__name__")))));
   if (array.ndim() != 1 || static_cast<std::size_t>(array.shape(0)) != failed.size())
-    throw py::value_error(fmt::format("step: failed of shape {}, ({},) expected", shape_of(array), failed.size()));
+    throw std::invalid_argument(
+        fmt::format("step: failed of shape {}, ({},) expected", shape_of(array), failed.size()));
   const py::array_t<bool, py::array::c_style | py::array::forcecast> flags(array);
   for (std::size_t i = 0; i < failed.size(); ++i) failed[i] = flags.data()[i] ? 1 : 0;
 }
@@ -52,24 +56,32 @@ py::array_t<double> rows_of(std::span<const double> values, std::size_t rows) {
   return array;
 }
 
+void raise_instead(py::error_already_set& error, const char* kind, const std::string& sentence) {
+  const py::object type = py::module_::import("metastable._errors").attr(kind);
+  py::raise_from(error, type.ptr(), sentence.c_str());
+  throw py::error_already_set();
+}
+
 py::object call_step(const std::function<py::object()>& step, const std::string& called) {
   try {
     return step();
   } catch (py::error_already_set& error) {
     const std::string said = py::str(error.value());
+    constexpr const char* arrays = "but states, noise and parameters are arrays of one number a row, so that";
     if (error.matches(PyExc_ValueError) && said.find("read-only") != std::string::npos)
-      py::raise_from(error, PyExc_ValueError,
-                     (called + ": it writes into a read-only array, as its arguments are (" + said + ")").c_str());
-    else if (error.matches(PyExc_ValueError) && said.starts_with("The truth value of an array"))
-      py::raise_from(error, PyExc_ValueError,
-                     (called +
-                      ": it asks whether an array is true, but states, noise and parameters are arrays of one number "
-                      "a row, so that numpy.where has to take the place of if (" +
-                      said + ")")
-                         .c_str());
-    else
-      throw;
-    throw py::error_already_set();
+      raise_instead(error, "InputError",
+                    fmt::format("{}: it writes into a read-only array, as its arguments are ({})", called, said));
+    if (error.matches(PyExc_ValueError) && said.starts_with("The truth value of an array"))
+      raise_instead(error, "InputError",
+                    fmt::format("{}: it asks whether an array is true, {} numpy.where has to take the place of if ({})",
+                                called, arrays, said));
+    // NumPy says size-1, length-1 or 0-dimensional, by its version.
+    if (error.matches(PyExc_TypeError) && said.starts_with("only ") && said.find("Python scalar") != std::string::npos)
+      raise_instead(error, "InputTypeError",
+                    fmt::format("{}: it makes one number of an array, {} functions of NumPy have to take the place of "
+                                "float and of those of math ({})",
+                                called, arrays, said));
+    throw;
   }
 }
 
@@ -86,12 +98,12 @@ void take_levels(const py::object& returned, std::span<double> levels) {
   const auto array = py::array_t<double, py::array::c_style | py::array::forcecast>::ensure(returned);
   if (!array) {
     PyErr_Clear();
-    throw py::type_error(fmt::format("level: numbers are to be returned, not {}",
-                                     std::string(py::str(py::type::of(returned).attr("__name__")))));
+    throw WrongKind(fmt::format("level: numbers are to be returned, not {}",
+                                std::string(py::str(py::type::of(returned).attr("__name__")))));
   }
   if (array.ndim() != 1 || array.size() != static_cast<py::ssize_t>(levels.size()))
-    throw py::value_error(fmt::format("level: {} numbers, one for each state, expected, and shape {} returned",
-                                      levels.size(), std::string(py::str(array.attr("shape")))));
+    throw std::invalid_argument(fmt::format("level: {} numbers, one for each state, expected, and shape {} returned",
+                                            levels.size(), std::string(py::str(array.attr("shape")))));
   std::copy_n(array.data(), levels.size(), levels.begin());
 }
 

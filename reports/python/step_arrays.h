@@ -17,16 +17,19 @@ namespace py = pybind11;
 py::array_t<double> rows_of(std::span<const double> values, std::size_t rows);
 
 /// Returns what a step, or another function of the user's, returns. @param called  its name in messages
-/// @throws what it throws; ValueError saying so where it writes into its arguments, or
-/// asks whether an array is true
+/// @throws what it throws; InputError saying so where it writes into its arguments, asks whether an array is true, or
+/// makes one number of an array
 py::object call_step(const std::function<py::object()>& step, const std::string& called = "step");
 
+/// Raises an error of this package, as InputError, in the place of one that was raised in a function of the user's.
+[[noreturn]] void raise_instead(py::error_already_set& error, const char* kind, const std::string& sentence);
+
 /// Copies what a step returned: (next states [rows x dimension], failed [rows]).
-/// @throws py::type_error or py::value_error saying what it returned instead
+/// @throws WrongKind or std::invalid_argument saying what it returned instead
 void take_step(const py::object& returned, std::size_t rows, std::span<double> next, std::span<std::uint8_t> failed);
 
 /// Copies what a level function returned: a number for each state.
-/// @throws py::type_error or py::value_error saying what it returned instead
+/// @throws WrongKind or std::invalid_argument saying what it returned instead
 void take_levels(const py::object& returned, std::span<double> levels);
 
 }  // namespace metastable::reports::python

@@ -7,8 +7,8 @@
     study.expected_steps.from_start, study.expected_steps.interval_95
 
 Angles are in degrees where a name ends in `_deg`; everything else is in SI units. The same seed gives the same numbers
-as the command line, to the bit, on any number of threads. Wrong arguments are an InputError (a ValueError), failed
-computations a ComputationError (a RuntimeError).
+as the command line, to the bit, on any number of threads. Wrong arguments are an InputError (a ValueError; those of the
+wrong kind also a TypeError), failed computations a ComputationError (a RuntimeError).
 """
 
 import dataclasses
@@ -26,17 +26,20 @@ from typing import Iterable, Optional, Sequence, Tuple, Union
 import numpy
 
 from metastable import _frames, _metastable, _progress, blind
-from metastable._errors import ComputationError, Contradiction, InputError, MapError
-from metastable._machines import Machine, Runs, machine, runs
+from metastable._arguments import by_name, kind, require_call, words
+from metastable._columns import listed
+from metastable._errors import ComputationError, Contradiction, InputError, InputTypeError, MapError
+from metastable._machines import Machine, machine
 from metastable._results import (Columns, Comparison, Description, Diagnosis, HowItFails, Record, Regime, Result, Solution,
                                  Study, Sweep, Table, WalkerComparison, WalkerStudy, Walks)
+from metastable._runs import Runs, runs
 
 __version__ = _metastable.version
 
 __all__ = [
     "Chain", "Columns", "Comparison", "ComputationError", "Contradiction", "Description", "Diagnosis", "Experiment",
-    "FirstPassage", "HowItFails", "InputError", "Machine", "MapError", "Passage", "QuasiStationary", "Record", "Regime", "Result", "Runs", "Setting",
-    "SimulatedSteps", "Solution", "Study", "Sweep", "Table", "Walker", "WalkerComparison", "WalkerSetting", "WalkerStudy", "Walks",
+    "FirstPassage", "HowItFails", "InputError", "InputTypeError", "Machine", "MapError", "Passage", "QuasiStationary", "Record",
+    "Regime", "Result", "Runs", "Setting", "SimulatedSteps", "Solution", "Study", "Sweep", "Table", "Walker", "WalkerComparison", "WalkerSetting", "WalkerStudy", "Walks",
     "blind", "chain", "compare", "describe", "diagnose", "effects", "experiment", "machine", "read_experiment", "runs", "simulate",
     "solve", "study", "sweep", "version_text", "walker",
 ]
@@ -259,7 +262,7 @@ def study(setting, *, method=None, cells=None, samples=None, tolerance=None, seq
                    spacing=spacing, simulated_steps=simulated_steps, guided_samples=guided_samples,
                    memory_gb=memory_gb, how_it_fails=how_it_fails, seed=seed, threads=threads, time_limit=time_limit)
     if level is not None and not callable(level) and not isinstance(level, str):
-        raise TypeError(f'level: "learnt", "mesh" or a function expected, not {type(level).__name__}')
+        raise InputTypeError(f'level: "learnt", "mesh" or a function expected, not {type(level).__name__}')
     if level is not None and not isinstance(setting, (Walker, Machine, WalkerSetting) if isinstance(level, str)
                                             else (Walker, Machine)):
         raise InputError("level: has no meaning under this setting")
@@ -277,7 +280,7 @@ def study(setting, *, method=None, cells=None, samples=None, tolerance=None, seq
             return WalkerStudy(_metastable.study_walkers([_fields(setting)], options, command, tell))
         if isinstance(setting, Walker):
             return WalkerStudy(_metastable.study_map(_fields(setting), options, command, tell, level))
-    raise TypeError(f"setting: a Setting, WalkerSetting, Walker or Machine expected, not {type(setting).__name__}")
+    raise InputTypeError(f"setting: a Setting, WalkerSetting, Walker or Machine expected, not {type(setting).__name__}")
 
 
 def compare(settings=None, *, collisions=16, method=None, cells=None, samples=None, tolerance=None, sequence=None,
@@ -417,9 +420,9 @@ def solve(setting, parameter, *, steps=None, survive=None, reach=None, start=Non
     setting's launch; where that is None, each is launched steadily. The other arguments are those of study().
     """
     if not isinstance(setting, (Setting, WalkerSetting)):
-        raise TypeError(f"setting: a Setting or WalkerSetting expected, not {type(setting).__name__}")
+        raise InputTypeError(f"setting: a Setting or WalkerSetting expected, not {type(setting).__name__}")
     if not isinstance(parameter, str):
-        raise TypeError(f"parameter: a text expected, not {type(parameter).__name__}")
+        raise InputTypeError(f"parameter: a text expected, not {type(parameter).__name__}")
     options = dict(steps=steps, survive=survive, reach=reach, start=start, stop=stop, points=points, method=method,
                    cells=cells, samples=samples, tolerance=tolerance, sequence=sequence, draws=draws, tail=tail,
                    replicates=replicates, mixing_distance=mixing_distance, eigenvalues=eigenvalues, spacing=spacing,
@@ -471,7 +474,7 @@ class Experiment:
 
     def write(self, folder):
         """As an experiment folder: experiment.toml, collisions.csv, trials.csv. Raises InputError if it holds one."""
-        self._held.write(os.fspath(folder))
+        self._held.write(_path(folder))
 
     def to_dict(self):
         """Title, ids of the conditions, notes, and the columns of collisions and trials, as plain data."""
@@ -511,13 +514,13 @@ class Experiment:
 def read_experiment(folder):
     """An experiment folder (experiment.toml, collisions.csv, trials.csv) as an Experiment. Raises InputError with all
     that is wrong, each with file, line and column (InputError.lines)."""
-    return Experiment(_metastable.read_experiment(os.fspath(folder)))
+    return Experiment(_metastable.read_experiment(_path(folder)))
 
 
 def _condition_id(given):
     """An id as a file holds it: 1, 1.0 and "1" are one."""
     if isinstance(given, bool) or not isinstance(given, (str, numbers.Real)):
-        raise TypeError(f"settings: ids of conditions are texts or numbers, not {type(given).__name__}")
+        raise InputTypeError(f"settings: ids of conditions are texts or numbers, not {type(given).__name__}")
     return str(int(given)) if isinstance(given, numbers.Real) and given == given // 1 else str(given)
 
 
@@ -534,12 +537,17 @@ def experiment(settings, collisions, trials=None, *, title="From arrays", rate_h
     if isinstance(settings, Setting):
         settings = {f"{settings.slope_deg:g}": settings}
 
-    def columns(table):
-        return {str(name): table[name] for name in table.keys()}
+    def columns(table, what):
+        if not hasattr(table, "keys"):
+            raise InputTypeError(f"{what}: columns by name expected (a dict, a DataFrame), not {kind(table)}")
+        return {str(name): listed(table[name], f"{what}: {name}") for name in table.keys()}
 
+    for each in by_name(settings, "settings", "{id: Setting}", other_names=True).values():
+        if not isinstance(each, Setting):
+            raise InputTypeError(f"settings: a Setting, or a dict {{id: Setting}}, expected, not {kind(each)}")
     return Experiment(_metastable.experiment_from_arrays(
-        [_condition_id(each) for each in settings], [_fields(each) for each in settings.values()], columns(collisions),
-        None if trials is None else columns(trials), dict(title=title, rate_hz=rate_hz, noise_sd=noise_sd)))
+        [_condition_id(each) for each in settings], [_fields(each) for each in settings.values()],
+        columns(collisions, "collisions"), None if trials is None else columns(trials, "trials"), dict(title=title, rate_hz=rate_hz, noise_sd=noise_sd)))
 
 
 def simulate(setting, *, trials=50, collisions=16, most_steps=None, stand_in=False, reality=False, effects=(),
@@ -562,17 +570,17 @@ def simulate(setting, *, trials=50, collisions=16, most_steps=None, stand_in=Fal
     trial is followed until it fails; more than `most_steps` steps of all together (None: no limit) are an error.
     """
     if not isinstance(setting, (Setting, WalkerSetting, Walker)):
-        raise TypeError(f"setting: a Setting, WalkerSetting or Walker expected, not {type(setting).__name__}")
+        raise InputTypeError(f"setting: a Setting, WalkerSetting or Walker expected, not {type(setting).__name__}")
     is_wheel = isinstance(setting, Setting)
     if most_steps is not None and is_wheel:
         raise InputError("most_steps: has a meaning with walker only")
     if collisions != 16 and not is_wheel:
         raise InputError("collisions: has no meaning with walker")
     options = dict(trials=None if trials == 50 else trials, collisions=None if collisions == 16 else collisions,
-                   stand_in=stand_in, reality=reality, effects=[effects] if isinstance(effects, str) else list(effects),
+                   stand_in=stand_in, reality=reality, effects=list(words(effects, "effects")),
                    outside=outside, skewness=skewness or None, sensor_noise=sensor_noise or None,
                    smoothing=smoothing or None, flight=not flight, shuffled=shuffled,
-                   drop=[drop] if isinstance(drop, str) else list(drop), angle_rate=angle_rate,
+                   drop=list(words(drop, "drop")), angle_rate=angle_rate,
                    angle_noise=angle_noise, seed=seed, threads=threads)
     told = {key: value for key, value in options.items() if key not in ("flight", "threads") and value}
     command = _called("simulate", setting, **told, **({} if flight else {"flight": 0}))
@@ -589,8 +597,16 @@ def simulate(setting, *, trials=50, collisions=16, most_steps=None, stand_in=Fal
         return Walks(walks["walks"], walks["steps"], walks["fell"])
 
 
+def _path(given, what="folder: the path of one"):
+    if not isinstance(given, (str, os.PathLike)):
+        raise InputTypeError(f"{what} expected, not {kind(given)}")
+    return os.fspath(given)
+
+
 def _experiment(what):
-    return what._held if isinstance(what, Experiment) else _metastable.read_experiment(os.fspath(what))
+    if isinstance(what, Experiment):
+        return what._held
+    return _metastable.read_experiment(_path(what, "experiment: an Experiment or the path of a folder"))
 
 
 def diagnose(experiment, machine=None, *, catalogue=(), at_slope=None, at_speed=None, seed=1, threads=0, progress=None):
@@ -602,13 +618,13 @@ def diagnose(experiment, machine=None, *, catalogue=(), at_slope=None, at_speed=
     at_slope    [deg] the machine's expected steps on another slope, too
     at_speed    [rad/s] the same for another launch, omega just before the first collision
     """
-    options = dict(catalogue=[catalogue] if isinstance(catalogue, str) else list(catalogue), seed=seed, threads=threads)
+    options = dict(catalogue=list(words(catalogue, "catalogue")), seed=seed, threads=threads)
     options.update({key: value for key, value in (("at_slope", at_slope), ("at_speed", at_speed)) if value is not None})
     command = _called("diagnose", experiment, *([] if machine is None else [machine]),
                       catalogue=options["catalogue"] or None, seed=seed)
     if isinstance(experiment, Runs) or machine is not None:
         if not isinstance(experiment, Runs) or not isinstance(machine, Machine):
-            raise TypeError("diagnose: runs of a machine are given with it: diagnose(runs, machine)")
+            raise InputTypeError("diagnose: runs of a machine are given with it: diagnose(runs, machine)")
         if experiment._columns != (tuple(machine.sensor), machine.inputs, machine.angles):
             raise InputError("diagnose: the runs were made for a machine with other columns")
         if at_slope is not None or at_speed is not None:
@@ -617,7 +633,7 @@ def diagnose(experiment, machine=None, *, catalogue=(), at_slope=None, at_speed=
             return Diagnosis(_metastable.diagnose_machine(machine._fields(), experiment._laid_out, options, command, tell))
     with _progress.telling(progress, "diagnose") as tell:
         if not isinstance(experiment, Experiment):
-            walks = _metastable.diagnose_walks(os.fspath(experiment), options, command, tell)
+            walks = _metastable.diagnose_walks(_path(experiment, "experiment: an Experiment, Runs or the path of a folder"), options, command, tell)
             if walks is not None:
                 return Diagnosis(walks)
         return Diagnosis(_metastable.diagnose(_experiment(experiment), options, command, tell))
@@ -631,8 +647,7 @@ def describe(experiment, *, transition="auto", against=(), trials=2000, seed=1, 
     transition  that is fitted: "collision" (omega_minus to omega_plus), "step" (to the next omega_minus), or "auto"
     against     laws to compare with, by `trials` simulated trials each
     """
-    options = dict(transition=transition, against=[against] if isinstance(against, str) else list(against),
-                   trials=trials, seed=seed, threads=threads)
+    options = dict(transition=transition, against=list(words(against, "against")), trials=trials, seed=seed, threads=threads)
     command = _called("describe", experiment, transition=transition, seed=seed)
     with _progress.telling(progress, "describe") as tell:
         return Description(_metastable.describe(_experiment(experiment), options, command, tell))
@@ -659,12 +674,19 @@ class Walker:
 
     def __post_init__(self):
         if not callable(self.step):
-            raise TypeError(f"step: a function expected, not {type(self.step).__name__}")
-        object.__setattr__(self, "start", _plain(numpy.atleast_1d(numpy.asarray(self.start, float))))
-        object.__setattr__(self, "names", tuple(self.names))
-        object.__setattr__(self, "noise_names", tuple(self.noise_names))
+            raise InputTypeError(f"step: a function expected, not {kind(self.step)}")
+        if isinstance(self.phases, numbers.Integral) and self.phases > 1:
+            require_call(self.step, 3, "step", "step(state, noise, phase)")
+        else:
+            require_call(self.step, 2, "step", "step(state, noise)")
+        start = numpy.atleast_1d(_numbers(self.start, "start"))
+        if not numpy.isfinite(start).all():
+            raise InputError(f"start: finite numbers expected, not {start.flat[numpy.isfinite(start).argmin()]}")
+        object.__setattr__(self, "start", _plain(start))
+        object.__setattr__(self, "names", words(self.names, "names"))
+        object.__setattr__(self, "noise_names", words(self.noise_names, "noise_names"))
         if isinstance(self.angles, str) or not isinstance(self.angles, Iterable):
-            raise TypeError(f"angles: names or places in a list expected, not {self.angles!r}")
+            raise InputTypeError(f"angles: names or places in a list expected, not {self.angles!r}")
         object.__setattr__(self, "angles", tuple(self._place(angle) for angle in self.angles))
         _metastable.check_map(_fields(self))
 
@@ -676,7 +698,7 @@ class Walker:
         try:
             return operator.index(angle)
         except TypeError:
-            raise TypeError(f"angles: a name or a whole number expected, not {angle!r}") from None
+            raise InputTypeError(f"angles: a name or a whole number expected, not {angle!r}") from None
 
     def study(self, **options):
         """study(self, ...)."""

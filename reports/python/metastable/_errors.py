@@ -10,6 +10,10 @@ class InputError(ValueError):
         return str(self).split("\n")
 
 
+class InputTypeError(InputError, TypeError):
+    """An argument of the wrong kind, as a text for a number; what a step returns, too. It is a TypeError as well."""
+
+
 class ComputationError(RuntimeError):
     """A computation that failed: a solver that did not reach its accuracy, or memory that does not suffice."""
 
@@ -23,6 +27,6 @@ class MapError(ComputationError):
     that fails, does not settle or is unstable, failures out of reach."""
 
 
-for kind in (InputError, ComputationError, Contradiction, MapError):
+for kind in (InputError, InputTypeError, ComputationError, Contradiction, MapError):
     kind.__module__ = "metastable"  # where people find them
 del kind

@@ -4,6 +4,8 @@ import contextlib
 import sys
 import time
 
+from metastable._errors import InputTypeError
+
 
 def _remaining(seconds):
     if seconds < 90:
@@ -99,4 +101,4 @@ def telling(progress, label):
     elif callable(progress):
         yield lambda share, doing: progress(share)
     else:
-        raise TypeError(f"progress: None, True, False or a function expected, not {type(progress).__name__}")
+        raise InputTypeError(f"progress: None, True, False or a function expected, not {type(progress).__name__}")

@@ -27,7 +27,9 @@ Evaluation followed(const Machine& machine, const MachineRuns& runs, const Machi
 
 // The log density of the seen rows after the first, given the first, by the covariance of all rows together: the first
 // state is that seen less its error, with nothing known of it before.
-double exact_log_density(const MachineTrial& trial, double a, double b, double s, double error, double correlation) {
+// @param pushes  by what differs between trials: its sd times its weight in each step
+double exact_log_density(const MachineTrial& trial, double a, double b, double s, double error, double correlation,
+                         const std::vector<std::vector<double>>& pushes = {}) {
   const auto n = static_cast<Eigen::Index>(trial.rows.size());
   // Rows as a linear function of (e_0, e_1, ..., z_1, ...): x_0 = y_0 - e_0.
   Eigen::MatrixXd from = Eigen::MatrixXd::Zero(n, 2 * n), noise = Eigen::MatrixXd::Identity(2 * n, 2 * n);
@@ -51,7 +53,12 @@ double exact_log_density(const MachineTrial& trial, double a, double b, double s
   for (Eigen::Index k = 1; k < n; ++k)
     if (!std::isnan(trial.rows[static_cast<std::size_t>(k)].seen[0])) seen.push_back(k);
   const auto m = static_cast<Eigen::Index>(seen.size());
-  const Eigen::MatrixXd all = from * noise * from.transpose();
+  Eigen::MatrixXd all = from * noise * from.transpose();
+  for (const std::vector<double>& push : pushes) {
+    Eigen::VectorXd moved = Eigen::VectorXd::Zero(n);
+    for (Eigen::Index k = 1; k < n; ++k) moved[k] = a * moved[k - 1] + push[static_cast<std::size_t>(k) - 1];
+    all += moved * moved.transpose();
+  }
   Eigen::MatrixXd covariance(m, m);
   Eigen::VectorXd off(m);
   for (Eigen::Index i = 0; i < m; ++i) {
@@ -132,6 +139,29 @@ TEST(MachineFilter, IsTheExactLikelihoodOfALinearMachine) {
     for (const MachineTrial& trial : runs.trials) exact += exact_log_density(trial, 0.8, 0.3, 0.2, 0.1, correlation);
     EXPECT_NEAR(followed(machine, runs, nominal_of(machine)).total(), exact, 1e-9 * std::abs(exact)) << correlation;
   }
+}
+
+TEST(MachineFilter, PushesOfASizeOfItsOwnInEachTrialArePartOfTheExactLikelihood) {
+  const Machine machine = linear_machine(0.1);
+  const MachineRuns runs =
+      scalar_runs(5, 12, 1.0, 0.1, 3, [](double x, double z, std::size_t) { return 0.8 * x + 0.3 + 0.2 * z; });
+  MachineHypothesis h = nominal_of(machine);
+  std::vector<std::vector<double>> pushes(2);
+  for (std::size_t part = 0; part < 2; ++part) {
+    const double sd = part == 0 ? 0.3 : 0.1;
+    h.push_spreads.push_back({0, sd, {}});
+    for (const MachineTrial& trial : runs.trials)
+      for (std::size_t k = 0; k < steps_of(trial); ++k) {
+        const double weight = part == 0 ? std::cos(2.6 * static_cast<double>(k)) : 1;
+        h.push_spreads.back().transition.push_back(weight);
+        if (&trial == &runs.trials[0]) pushes[part].push_back(sd * weight);
+      }
+  }
+  double exact = 0;
+  for (const MachineTrial& trial : runs.trials) exact += exact_log_density(trial, 0.8, 0.3, 0.2, 0.1, 0, pushes);
+  const ScorePlan plan = score_plan(machine, runs, nominal_of(machine));
+  const Evaluation found = follow_machine(machine, runs, plan, machine_events(machine, runs, plan), h);
+  EXPECT_NEAR(found.total(), exact, 1e-9 * std::abs(exact));
 }
 
 Machine skewed_machine(double error) {

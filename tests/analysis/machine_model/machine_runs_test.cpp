@@ -4,6 +4,7 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 #include <numbers>
 #include <stdexcept>
@@ -73,16 +74,50 @@ TEST_F(LookedOver, AStepThatHangsOnOtherRowsIsRefused) {
   EXPECT_NE(mixed.find("arrays of one number a row"), std::string::npos) << mixed;
 }
 
-TEST_F(LookedOver, AStepThatTakesTheMeanOfAllRowsIsRefused) {
+// A mean over every other row is nearly that of all rows, and the largest of all is among them in half of the cases.
+TEST_F(LookedOver, AStepThatTakesTheMeanOrTheLargestOfAllRowsIsRefused) {
   const auto right = machine_.step;
-  machine_.step = [&](const MachineBatch& batch) {
-    right(batch);
-    double mean = 0;
-    for (std::size_t i = 0; i < batch.rows; ++i) mean += batch.states[i] / static_cast<double>(batch.rows);
-    for (std::size_t i = 0; i < batch.rows; ++i) batch.next[i] -= 0.3 * mean;
-  };
-  const std::string said_of_it = message_of([&] { said(); });
-  EXPECT_NE(said_of_it.find("when some of the others are not asked for"), std::string::npos) << said_of_it;
+  for (const bool largest : {false, true})
+    for (const double share : {0.3, 0.003}) {
+      machine_.step = [&](const MachineBatch& batch) {
+        right(batch);
+        double mean = 0;
+        for (std::size_t i = 0; i < batch.rows; ++i) mean += batch.states[i] / static_cast<double>(batch.rows);
+        const double of_all = largest ? std::ranges::max(batch.states) : mean;
+        for (std::size_t i = 0; i < batch.rows; ++i) batch.next[i] -= share * of_all;
+      };
+      const std::string said_of_it = message_of([&] { said(); });
+      EXPECT_NE(said_of_it.find("when some of the others are not asked for"), std::string::npos)
+          << said_of_it << largest << share;
+    }
+}
+
+// Squares of such values overflow, or are lost.
+TEST_F(LookedOver, ColumnsOfASizeThatNoMachineHasAreRefused) {
+  const MachineRuns right = runs_;
+  for (const double factor : {1e300, 1e-300, 1e120, 1e-120}) {
+    runs_ = right;
+    for (MachineTrial& trial : runs_.trials)
+      for (MachineRow& row : trial.rows) row.seen[0] *= factor;
+    const std::string refused = message_of([&] { said(); });
+    EXPECT_EQ(refused.find("runs: x goes from "), 0u) << refused;
+    EXPECT_NE(
+        refused.find(": values up to 1e+100 that differ by 1e-100 or more are expected: is it in another unit than "
+                     "the machine?"),
+        std::string::npos)
+        << refused;
+  }
+}
+
+TEST_F(LookedOver, ColumnsFarFromTheMachinesSizeAreAskedAbout) {
+  const MachineRuns right = runs_;
+  for (const double factor : {1e6, 1e-6}) {
+    runs_ = right;
+    for (MachineTrial& trial : runs_.trials)
+      for (MachineRow& row : trial.rows) row.seen[0] *= factor;
+    EXPECT_NE(said().find("times what the machine makes of the rows before: is it in another unit?"), std::string::npos)
+        << said();
+  }
 }
 
 TEST_F(LookedOver, NoiseThatChangesNothingIsNoted) {

@@ -5,6 +5,7 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <atomic>
 #include <cmath>
 #include <cstdint>
@@ -16,7 +17,9 @@
 #include <utility>
 #include <vector>
 
+#include "analysis/machine_model/machine_design.h"
 #include "analysis/machine_model/machine_effects.h"
+#include "analysis/machine_model/machine_runs.h"
 #include "tests/message_of.h"
 
 namespace metastable::analysis::test {
@@ -153,6 +156,48 @@ TEST_F(MachineNames, OfEffectsAreTheirOwn) {
   EXPECT_EQ(refused(), "effects: \"no_gap\" is a name that answers give to no effect");
   machine.effects = {{"drag+friction", {{"c", 0, -0.5, 0.5}}}};
   EXPECT_EQ(refused(), "effects: \"drag+friction\": a name holds no +, which joins several effects");
+}
+
+TEST_F(MachineNames, OfEffectsAreNotThoseOfAnyMachine) {
+  machine.parameters = {{"pace", 1, 0.1}, {"pace_drift", 1, 0.1}};
+  machine.may_vary = {"pace"};
+  machine.inputs = {"load"};
+  for (const char* name :
+       {"memory", "outliers", "pace_spread", "pace_with_x", "lag_load", "sensor_noise_x", "launch_x"}) {
+    machine.effects = {{name, {{"c", 0, -0.5, 0.5}}}};
+    EXPECT_EQ(refused(), std::string("effects: \"") + name +
+                             "\" is the name of an effect that any machine may have: give yours another");
+  }
+  machine.effects = {{"pace_by_floor", {{"c", 0, -0.5, 0.5}}}, {"pace_drift_drift", {{"d", 0, -0.5, 0.5}}}};
+  EXPECT_EQ(refused(), "nothing was thrown");  // No label "floor" is known yet, and pace_drift does not vary.
+}
+
+// Whatever effect is added to those of any machine, its name is refused to its user's.
+TEST_F(MachineNames, OfAnyMachinesEffectsAreAllTaken) {
+  machine.parameters = {{"pace", 1, 0.1}};
+  machine.may_vary = {"pace"};
+  machine.inputs = {"load"};
+  machine.states = {"x", "y"};
+  machine.launches = {{"y", 0, 1}};
+  MachineRuns runs;
+  runs.conditions = {"all"};
+  runs.labels = {{"floor", {"oak", "stone"}}};
+  for (const double load : {0.5, 1.5}) {
+    MachineTrial& trial = runs.trials.emplace_back();
+    for (const double x : {0.0, 1.0 + load, 2.0}) {
+      MachineRow& row = trial.rows.emplace_back();
+      row.seen = {x};
+      row.labels = {0};
+      row.inputs = {load * x + 0.1 * x * x};
+    }
+  }
+  const std::vector<std::string> taken = generic_effect_names(machine);
+  const auto effects = machine_effects(machine, std::make_shared<MachineDesign>(machine_design(machine, runs)));
+  EXPECT_GT(effects.size(), 10u);
+  for (const MachineCandidate& one : effects) {
+    const std::string& id = one.candidate.id;
+    EXPECT_TRUE(id == "pace_by_floor" || std::ranges::find(taken, id) != taken.end()) << id;
+  }
 }
 
 TEST(Machine, UnitsAreThoseThatNamesEndIn) {

@@ -84,6 +84,17 @@ class Pendulum(unittest.TestCase):
         one, two = (metastable.diagnose(runs, machine, threads=n) for n in (1, 2))
         self.assertEqual([cause.to_dict() for cause in one.causes], [cause.to_dict() for cause in two.causes])
 
+    def test_few_trials_speak_of_phases_where_there_are_any(self):
+        machine, data = pendulum(), swung(trials=5, swings=9)
+        statements = {}
+        for phases in (1, 3):
+            runs = metastable.runs(machine, phase=[f"p{k % phases}" for k in range(45)], **data)
+            answer = metastable.diagnose(runs, machine, catalogue="dry_friction")
+            statements[phases] = [one.statement for one in answer.not_possible]
+            self.assertNotRegex(" ".join(answer.sentences), r"\bleg\b")
+        self.assertIn("which phase the gap lies in", statements[3])
+        self.assertNotIn("which phase the gap lies in", statements[1])
+
     def test_columns_come_from_anything_that_has_them(self):
         machine = pendulum(inputs=["temperature"])
         data = dict(swung(trials=10), temperature=np.full(240, 20.0))
@@ -185,11 +196,70 @@ class Refused(unittest.TestCase):
         self.check("\"swing\" is none of the states swing_rad", lambda: pendulum(sensor={"swing": 0.1}))
         self.check("decay: the nominal value 2 is outside its bounds [0, 1]", lambda: pendulum(parameters={"decay": (2, 0.1, 0, 1)}))
         self.check("may_vary: \"drag\" is none of the parameters", lambda: pendulum(may_vary=["drag"]))
-        self.check("effects: dry: loss_rad: 2 numbers given, 3 to 3 expected", lambda: pendulum(effects={"dry": {"loss_rad": (0, 1)}}))
+        self.check("effects: dry: loss_rad: 2 numbers given, 3 expected (neutral, lower, upper)", lambda: pendulum(effects={"dry": {"loss_rad": (0, 1)}}))
         self.check("correlation 0.7 between neighbouring rows is outside [-0.5, 0.5]", lambda: pendulum(sensor={"swing_rad": (0.1, 0.7)}))
-        self.check("step: a function expected", lambda: pendulum(step=3), TypeError)
+        self.check("step: a function expected", lambda: pendulum(step=3))
         self.check("units: \"swing\" is none of swing_rad, decay, scatter_rad, loss_rad, per_rad", lambda: pendulum(units={"swing": "rad"}))
-        self.check("units: swing_rad: a word expected, not int", lambda: pendulum(units={"swing_rad": 3}), TypeError)
+        self.check("units: swing_rad: a word expected, not int", lambda: pendulum(units={"swing_rad": 3}))
+
+    def test_arguments_of_the_wrong_kind(self):
+        for argument, given, sentence in (
+                ("parameters", [1, 2], "parameters: a dict {name: (nominal, sd[, lower, upper])} expected, not list"),
+                ("parameters", {1: 2}, "whose names are words, not int"),
+                ("parameters", {"decay": "x"}, "parameters: decay: numbers (nominal, sd[, lower, upper]) expected, not str"),
+                ("parameters", {"decay": (1,) * 5}, "parameters: decay: 5 numbers given, 1 to 4 expected (nominal, sd[, lower, upper])"),
+                ("parameters", {"decay": 10**400}, "parameters: decay: a number is too large for double precision"),
+                ("states", 3, "states: a name or a list of names expected, not int"),
+                ("states", {"swing_rad"}, "states: a name or a list of names expected, not set"),
+                ("states", [1], "states: words expected, not int"),
+                ("effects", "x", "effects: a dict {id: {name: (neutral, lower, upper)}} expected, not str"),
+                ("effects", {"dry": 3}, "effects: dry: a dict {name: (neutral, lower, upper)} expected, not int"),
+                ("effects", {"dry": ["loss_rad"]}, "effects: dry: a dict {name: (neutral, lower, upper)} expected, not list"),
+                ("effects", {"dry": {"loss_rad": 3}}, "effects: dry: loss_rad: 1 number given, 3 expected (neutral, lower, upper)"),
+                ("sensor", 5, "sensor: a dict {state: sd, or (sd, correlation), or None for an sd that is fitted} expected, not int"),
+                ("sensor", {"swing_rad": "y"}, "sensor: swing_rad: a number (sd) or two (sd, correlation) expected, not str"),
+                ("sensor", {"swing_rad": ()}, "sensor: swing_rad: 0 numbers given, 1 to 2 expected (sd, correlation)"),
+                ("may_vary", 7, "may_vary: a name or a list of names expected, not int"),
+                ("noise", "a", "noise: a whole number expected, not str"), ("noise", True, "noise: a whole number expected, not bool"),
+                ("noise", 0, "noise: 0 is outside 1..16"), ("most_wild", "a", "most_wild: a number expected, not str"),
+                ("launch", {"swing_rad": 1}, "launch: swing_rad: 1 number given, 2 expected (mean, sd)"),
+                ("launch", {"swing": (1, 2)}, "launch: \"swing\" is none of the states swing_rad"),
+                ("inputs", 5, "inputs: a name or a list of names expected, not int"), ("name", 5, "name: a text expected, not int"),
+                ("units", 5, "units: a dict {name: unit} expected, not int"),
+                ("step", lambda state, noise: state, "step: it is called as step(state, noise, p), and takes other arguments")):
+            self.check(sentence, lambda: pendulum(**{argument: given}))
+        for kind in (ValueError, TypeError, metastable.InputTypeError):
+            with self.assertRaises(kind):
+                pendulum(states=3)
+
+    def test_columns_and_options_of_the_wrong_kind(self):
+        machine, data = pendulum(), swung(trials=5)
+        for given, sentence in (
+                (dict(labels=5), "labels: a name or a list of names expected, not int"),
+                (dict(labels={"crew": [{}] * 120}), "crew: words or numbers expected, not dict in row 1"),
+                (dict(inputs=["load"]), "inputs: a dict {name: column} expected, not list"),
+                (dict(inputs={"load": [1] * 120}), "inputs: \"load\" is none of the machine's: it has none"),
+                (dict(outcome=5), "outcome: one for each of the 5 trials expected, not int"),
+                (dict(outcome=["fell"] * 5), "outcome: \"fell\" is none of failed, stopped, lost"),
+                (dict(trial=[{}] * 120), "trial: words or numbers expected, not dict in row 1"),
+                (dict(time_s=[[1], [1, 2]] * 60), "time_s: one value a row expected, not list"),
+                (dict(swing_rad=[10**400] * 120), "swing_rad: numbers expected, and NaN for missing ones, not '1000")):
+            self.check(sentence, lambda: metastable.runs(machine, **{**data, **given}))
+        runs = metastable.runs(machine, **data)
+        for given, sentence in ((dict(catalogue=5), "catalogue: a name or a list of names expected, not int"),
+                                (dict(seed="a"), "seed: a whole number expected, not str"),
+                                (dict(progress=5), "progress: None, True, False or a function expected, not int")):
+            self.check(sentence, lambda: metastable.diagnose(runs, machine, **given))
+        self.check("experiment: an Experiment, Runs or the path of a folder expected, not int", lambda: metastable.diagnose(5))
+        self.check("start: finite numbers expected, not nan", lambda: machine.walker(start=[np.nan]))
+        self.check("start: real numbers expected", lambda: machine.walker(start="here"))
+
+    def test_columns_of_a_size_that_no_machine_has(self):
+        machine, data = pendulum(), swung(trials=5)
+        for factor in (1e300, 1e-300):
+            runs = metastable.runs(machine, trial=data["trial"], swing_rad=factor * data["swing_rad"])
+            self.check("values up to 1e+100 that differ by 1e-100 or more are expected: is it in another unit than the machine?",
+                       lambda: metastable.diagnose(runs, machine))
 
     def test_an_error_that_is_too_small_for_a_density(self):
         self.check("sensor: swing_rad: the machine's noise does not reach it, and the sd of its error, 1e-10, is less than 1e-06 "
@@ -205,12 +275,21 @@ class Refused(unittest.TestCase):
             state[:, 0] *= p["decay"]
             return state, np.zeros(len(state), bool)
 
-        self.check("next states of shape", asked(lambda s, z, p: (np.zeros((len(s), 2)), np.zeros(len(s), bool))), ValueError)
-        self.check("(next states, failed) is to be returned", asked(lambda s, z, p: s), TypeError)
+        self.check("next states of shape", asked(lambda s, z, p: (np.zeros((len(s), 2)), np.zeros(len(s), bool))))
+        self.check("step: failed of shape (), ", asked(lambda s, z, p: (s, False)))
+        self.check("(next states, failed) is to be returned", asked(lambda s, z, p: s))
+        self.check("step: the next states are no array of real numbers, but of dtype complex128", asked(lambda s, z, p: (s + 0j, s[:, 0] > 9)))
+        self.check("step: whether each state failed is no array of booleans, but of dtype float64", asked(lambda s, z, p: (s, s[:, 0])))
+        self.check("step: it makes one number of an array, but states, noise and parameters are arrays of one number a row",
+                   asked(lambda s, z, p: (float(p["decay"]) * s, s[:, 0] > 9)))
+        self.check("step: it asks a dict for 'dcay', which is not there; p has decay, scatter_rad, loss_rad, per_rad",
+                   asked(lambda s, z, p: (p["dcay"] * s, s[:, 0] > 9)))
+        self.check("when some of the others are not asked for", asked(
+            lambda s, z, p: (step(s, z, p)[0] + 0.01 * s.max(), s[:, 0] > 9)))
         self.check("step: no finite state comes of trial 0, row 1", asked(lambda s, z, p: (s + np.inf, np.zeros(len(s), bool))))
         self.check("step: the next swing_rad is NaN, and not marked as failed, from swing_rad",
                    asked(lambda s, z, p: (s * np.nan, np.zeros(len(s), bool))))
-        self.check("step: it writes into a read-only array, as its arguments are", asked(writes), ValueError)
+        self.check("step: it writes into a read-only array, as its arguments are", asked(writes))
         drawn = np.random.default_rng(1)
         self.check("step: it makes something else of the same states", asked(
             lambda s, z, p: (p["decay"] * s + 0.01 * drawn.standard_normal(s.shape), np.zeros(len(s), bool))))
@@ -250,9 +329,9 @@ class Refused(unittest.TestCase):
         def takes(state, noise, p):
             return step(state, noise, dict(p, loss_rad=p.pop("loss_rad")))
 
-        self.check("step: it writes into p, whose \"decay\" is not what it was given any more", asked(changes), ValueError)
-        self.check("step: it writes into p, which has names that it was not given", asked(adds), ValueError)
-        self.check("step: it writes into p, whose \"loss_rad\"", asked(takes), ValueError)
+        self.check("step: it writes into p, whose \"decay\" is not what it was given any more", asked(changes))
+        self.check("step: it writes into p, which has names that it was not given", asked(adds))
+        self.check("step: it writes into p, whose \"loss_rad\"", asked(takes))
         self.check("step: it writes into p, which it may only read",
                    lambda: pendulum(step=changes).walker(start=[0.8]).study(simulated_steps=0))
 
@@ -260,7 +339,7 @@ class Refused(unittest.TestCase):
         def branches(state, noise, p):
             return step(state, noise, p) if p["decay"] > 0.5 else (state, np.ones(len(state), bool))
 
-        with self.assertRaisesRegex(ValueError, "step: it asks whether an array is true, but states, noise and parameters are "
+        with self.assertRaisesRegex(metastable.InputError, "step: it asks whether an array is true, but states, noise and parameters are "
                                                 "arrays of one number a row, .* \\(The truth value of an array"):
             diagnosed(pendulum(step=branches), trials=5)
 
@@ -269,7 +348,7 @@ class Refused(unittest.TestCase):
         self.check("walker: decay: 2 is outside its bounds [0, 1]", lambda: bounded.walker(start=[0.8], decay=2))
         self.check("walker: dry_friction: loss_rad: 5 is outside its bounds [0, 0.05]", lambda: bounded.walker(start=[0.8], loss_rad=5))
         self.check("walker: decay: nan is outside its bounds [0, 1]", lambda: bounded.walker(start=[0.8], decay=np.nan))
-        self.check("walker: decay: numbers expected, not str", lambda: bounded.walker(start=[0.8], decay="much"), TypeError)
+        self.check("walker: decay: a number expected, not str", lambda: bounded.walker(start=[0.8], decay="much"))
         self.check("parameters: decay: lower is above upper in its bounds [1, 0]", lambda: pendulum(parameters={"decay": (0.9, 0.1, 1, 0)}))
         self.check("effects: dry: loss_rad: lower is above upper in its bounds [0.05, 0]", lambda: pendulum(
             effects={"dry": {"loss_rad": (0, 0.05, 0)}}))
@@ -281,7 +360,7 @@ class Refused(unittest.TestCase):
         self.check("swing_rad: shape (3,) given, (120,) expected", lambda: metastable.runs(machine, trial=data["trial"], swing_rad=[1, 2, 3]))
         self.check("do not stand together", lambda: metastable.runs(machine, trial=[1, 2, 1], swing_rad=[1, 2, 3]))
         self.check("\"speed\" is none of the columns", lambda: metastable.runs(machine, speed=[1], **data))
-        self.check("anything with columns by name", lambda: metastable.runs(machine, [data["trial"], data["swing_rad"]]), TypeError)
+        self.check("anything with columns by name", lambda: metastable.runs(machine, [data["trial"], data["swing_rad"]]))
         named = metastable.runs(machine, trial=[10, 10, 20, 20], swing_rad=[0.8, 0.7, 0.8, np.inf])
         self.check("trial 20: a state is infinite", lambda: metastable.diagnose(named, machine))
         still = metastable.runs(machine, trial=data["trial"], swing_rad=np.ones(120))
@@ -294,17 +373,26 @@ class Refused(unittest.TestCase):
         self.check("there is no transition", lambda: metastable.diagnose(apart, machine))
         self.check("outcome: \"fell\" is none of failed, stopped, lost", lambda: metastable.diagnose(
             metastable.runs(machine, outcome=["fell"] * 5, **data), machine))
-        self.check("runs of a machine are given with it", lambda: metastable.diagnose(few), TypeError)
+        self.check("runs of a machine are given with it", lambda: metastable.diagnose(few))
         self.check("condition: row 2 has none", lambda: metastable.runs(machine, trial=[1, 1], swing_rad=[0.8, 0.7], condition=["a", None]))
         self.check("trial: row 2 has none", lambda: metastable.runs(machine, trial=[1, np.nan], swing_rad=[0.8, 0.7]))
         self.check("outcome: 7 is no trial", lambda: metastable.runs(machine, trial=[1, 1], swing_rad=[0.8, 0.7], outcome={7: "failed"}))
         self.check("a masked array is given", lambda: metastable.runs(
-            machine, trial=[1, 1], swing_rad=np.ma.masked_equal([0.8, 0.7], 0.7)), TypeError)
+            machine, trial=[1, 1], swing_rad=np.ma.masked_equal([0.8, 0.7], 0.7)))
         self.check("a machine with other columns", lambda: metastable.diagnose(
             few, metastable.machine(step, states=["angle"], noise=1, parameters=dict(machine.parameters))))
         self.check("states: \"phase\" is a word of the runs' own", lambda: pendulum(states=["phase"], sensor={"phase": 0.1}))
-        self.check("effects: \"memory\" is the name of an effect that any machine may have", lambda: diagnosed(
-            pendulum(effects={"memory": {"loss_rad": (0, 0, 0.05)}, "quadratic_drag": {"per_rad": (0, 0, 0.5)}}), trials=5))
+
+    def test_effects_named_as_those_of_any_machine(self):
+        for name in ("memory", "outliers", "decay_by_phase", "decay_drift", "decay_clock", "decay_with_swing_rad", "lag_load",
+                     "sensor_noise_swing_rad", "sensor_bias_swing_rad", "launch_swing_rad", "launch_spread_swing_rad"):
+            self.check(f"effects: \"{name}\" is the name of an effect that any machine may have: give yours another",
+                       lambda: pendulum(inputs=["load"], effects={name: {"loss_rad": (0, 0, 0.05)}, "drag": {"per_rad": (0, 0, 0.5)}}))
+        pendulum(may_vary=[], effects={"decay_drift": {"loss_rad": (0, 0, 0.05)}, "drag": {"per_rad": (0, 0, 0.5)}})
+        labelled = pendulum(effects={"decay_by_crew": {"loss_rad": (0, 0, 0.05)}, "drag": {"per_rad": (0, 0, 0.5)}})
+        data = swung(trials=5)
+        self.check("effects: \"decay_by_crew\" is the name of an effect that any machine may have", lambda: metastable.diagnose(
+            metastable.runs(labelled, labels={"crew": data["trial"] % 2}, **data), labelled))
 
     def test_other_units_are_suspected_aloud(self):
         machine, data = pendulum(), swung(trials=10)

@@ -50,7 +50,7 @@ class Settings(unittest.TestCase):
                                  (dict(mass=[1, 2]), "mass: a number expected, not list"),
                                  (dict(law=3), "law: a text expected, not int"),
                                  (dict(friction=(math.nan, 0.1)), "nan")):
-            with self.assertRaisesRegex((ValueError, TypeError), sentence):
+            with self.assertRaisesRegex(metastable.InputError, sentence):
                 metastable.Setting(**fields)
 
 
@@ -102,7 +102,7 @@ class Studies(unittest.TestCase):
                                   (dict(standard_errors={"mood": 1}), "mood")):
             with self.assertRaisesRegex(metastable.InputError, sentence):
                 metastable.study(setting, **options)
-        with self.assertRaisesRegex(TypeError, "a Setting, WalkerSetting, Walker or Machine expected, not int"):
+        with self.assertRaisesRegex(metastable.InputError, "a Setting, WalkerSetting, Walker or Machine expected, not int"):
             metastable.study(3)
 
 
@@ -147,7 +147,7 @@ class Waiting(unittest.TestCase):
         self.assertTrue(shares and all(0 <= share <= 1 for share in shares))
         with self.assertRaises(ZeroDivisionError):
             metastable.study(setting, tolerance=1e-5, progress=lambda share: 1 / 0)
-        with self.assertRaisesRegex(TypeError, "progress: None, True, False or a function expected, not str"):
+        with self.assertRaisesRegex(metastable.InputError, "progress: None, True, False or a function expected, not str"):
             metastable.study(metastable.Setting(), progress="loud")
 
     def test_a_line_on_a_terminal_and_a_bar_in_a_notebook(self):
@@ -231,7 +231,7 @@ class Experiments(unittest.TestCase):
             self.assertEqual(read.collisions.condition.tolist(), [0, 0, 1, 1])
         with self.assertRaisesRegex(metastable.InputError, "1"):
             metastable.experiment({1: settings[1], "1": settings[2]}, {**speeds, "condition": [1, 1, 1, 1]})
-        with self.assertRaisesRegex(TypeError, "settings: ids of conditions are texts or numbers, not tuple"):
+        with self.assertRaisesRegex(metastable.InputError, "settings: ids of conditions are texts or numbers, not tuple"):
             metastable.experiment({(1, 2): settings[1]}, speeds)
 
     def test_defects_have_their_places(self):

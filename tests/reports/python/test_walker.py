@@ -81,13 +81,13 @@ class Steps(unittest.TestCase):
         for step, kind, sentence in (
             (lambda s, z: (np.full_like(s, np.nan), fine[1].repeat(len(s))), metastable.MapError,
              r"from the state x \[m\] = 0 \(phase 0\) it leads to x \[m\] = nan, which is not finite"),
-            (lambda s, z: s, TypeError, r"step: \(next states, failed\) is to be returned, not ndarray"),
+            (lambda s, z: s, metastable.InputError, r"step: \(next states, failed\) is to be returned, not ndarray"),
             (lambda s, z: (s[:, :0], fine[1].repeat(len(s))), ValueError,
              r"step: next states of shape \(\d+, 0\), \(\d+, 1\) expected"),
             (lambda s, z: (s, np.zeros((len(s), 1), bool)), ValueError, r"step: failed of shape \(\d+, 1\)"),
-            (lambda s, z: (s * 1j, fine[1].repeat(len(s))), TypeError, "of dtype complex128"),
-            (lambda s, z: (s, np.zeros(len(s))), TypeError, "no array of booleans, but of dtype float64"),
-            (lambda s, z: (None, None), TypeError, "no array of real numbers"),
+            (lambda s, z: (s * 1j, fine[1].repeat(len(s))), metastable.InputError, "of dtype complex128"),
+            (lambda s, z: (s, np.zeros(len(s))), metastable.InputError, "no array of booleans, but of dtype float64"),
+            (lambda s, z: (None, None), metastable.InputError, "no array of real numbers"),
             (lambda s, z: 1 / 0, ZeroDivisionError, "division by zero"),
             (lambda s, z: (2 * s + z, fine[1].repeat(len(s))), metastable.MapError, "unstable"),
         ):
@@ -102,7 +102,7 @@ class Steps(unittest.TestCase):
                                  (dict(noise_names=["a", "b"]), "noise_names: 2 given")):
             with self.subTest(sentence), self.assertRaisesRegex(metastable.InputError, sentence):
                 metastable.walker(**{**dict(step=drift, dimension=1, noise=1, start=[0]), **fields})
-        with self.assertRaisesRegex(TypeError, "step: a function expected, not int"):
+        with self.assertRaisesRegex(metastable.InputError, "step: a function expected, not int"):
             metastable.walker(3, 1, 1, start=[0])
 
     def test_failures_that_the_meshes_step_over_give_no_number(self):
@@ -129,7 +129,7 @@ class Steps(unittest.TestCase):
             with self.assertRaisesRegex(metastable.InputError, sentence):
                 metastable.walker(turned, 1, 1, start=[np.pi], names=["angle [rad]"], angles=angles)
         for angles, sentence in ((5, "names or places in a list expected, not 5"), ([0.5], "a name or a whole number")):
-            with self.assertRaisesRegex(TypeError, "angles: " + sentence):
+            with self.assertRaisesRegex(metastable.InputError, "angles: " + sentence):
                 metastable.walker(turned, 1, 1, start=[np.pi], angles=angles)
 
     def test_of_six_dimensions_are_split(self):
@@ -180,10 +180,10 @@ class Steps(unittest.TestCase):
         self.assertEqual(walker.study(method="auto", tolerance=0.2, simulated_steps=0).splitting.split_by, "learnt")
         for level, kind, sentence in (
                 (lambda state: state, ValueError, r"level: \d+ numbers, one for each state, expected, and shape"),
-                (lambda state: "far", TypeError, "level: numbers are to be returned, not str"),
+                (lambda state: "far", metastable.InputError, "level: numbers are to be returned, not str"),
                 (lambda state: np.where(state[:, 0] > 0, np.nan, 0), metastable.MapError, "level function: it is nan"),
                 ("far", metastable.InputError, "level: 'far' is none of learnt, mesh"),
-                (3, TypeError, 'level: "learnt", "mesh" or a function expected, not int')):
+                (3, metastable.InputError, 'level: "learnt", "mesh" or a function expected, not int')):
             with self.subTest(sentence), self.assertRaisesRegex(kind, sentence):
                 walker.study(method="splitting", tolerance=0.2, level=level)
         with self.assertRaisesRegex(metastable.InputError, 'level: has no meaning with method "mesh"'):
