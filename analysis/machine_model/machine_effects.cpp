@@ -447,6 +447,19 @@ std::vector<MachineCandidate> machine_effects(const Machine& machine, std::share
   return all;
 }
 
+std::string alternating_memory(const MachineDesign& design, std::span<const EffectTerm> terms) {
+  const bool below = std::ranges::any_of(
+      terms, [](const EffectTerm& term) { return term.candidate->id == "memory" && term.values.front() < 0; });
+  if (!below || design.phases.size() != 2) return {};
+  for (std::size_t k = 1; k < design.steps.size(); ++k)
+    if (design.steps[k].trial == design.steps[k - 1].trial && design.steps[k].phase == design.steps[k - 1].phase)
+      return {};
+  return fmt::format(
+      "A memory below zero alternates from step to step, and so do the phases {} and {}: what differs between these may "
+      "pass for it.",
+      design.phases[0], design.phases[1]);
+}
+
 std::vector<std::string> generic_effect_names(const Machine& machine) {
   std::vector<std::string> names{"memory", "outliers"};
   for (const std::string& input : machine.inputs) names.push_back("lag_" + input);

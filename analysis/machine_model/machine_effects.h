@@ -2,6 +2,7 @@
 // The effects of a machine as they are fitted: those that its user suspects, and those that any machine may have.
 
 #include <memory>
+#include <span>
 #include <string>
 #include <vector>
 
@@ -25,6 +26,9 @@ struct MachineCandidate {
 /// scatter more than it is stated) for each state that is measured or whose launch is stated. Those that the runs
 /// cannot show say why.
 std::vector<MachineCandidate> machine_effects(const Machine& machine, std::shared_ptr<const MachineDesign> design);
+
+/// Says in a sentence that phases alternate from step to step as a memory below zero does, where both do; else "".
+std::string alternating_memory(const MachineDesign& design, std::span<const EffectTerm> terms);
 
 /// Names the effects that a machine with these parameters, states and inputs may have whatever its runs are: those of
 /// machine_effects() that its user does not suspect, but for q_by_LABEL.

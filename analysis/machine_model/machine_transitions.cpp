@@ -155,6 +155,7 @@ class MachineTransitions : public TransitionModel {
   const std::vector<Variation>& variations() const override { return variations_; }
   const Candidate* even_push() const override { return &push_.variation.candidate; }
   std::string steps_not_told() const override { return replayed_inputs(*machine_, *design_); }
+  std::string size_in_words(std::span<const EffectTerm> t) const override { return alternating_memory(*design_, t); }
   bool refits_noise() const override {
     return std::ranges::any_of(machine_->observe, [](const MachineSensor& s) { return !s.sd; });
   }

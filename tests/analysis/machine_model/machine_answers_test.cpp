@@ -14,8 +14,11 @@
 #include "analysis/diagnosis/diagnosis.h"
 #include "analysis/diagnosis/machine_steps.h"
 #include "analysis/fitting/model_fit.h"
+#include "analysis/machine_model/machine_design.h"
+#include "analysis/machine_model/machine_effects.h"
 #include "analysis/machine_model/machine_transitions.h"
 #include "tests/analysis/machine_model/machines.h"
+#include "tests/message_of.h"
 
 namespace metastable::analysis::test {
 namespace {
@@ -71,6 +74,92 @@ TEST(MachineAnswers, NameAParameterThatDiffersBetweenTwoPhases) {
   ASSERT_EQ(d.verdict, Verdict::explained) << told(d);
   EXPECT_EQ(d.causes.set, std::vector<std::string>{"grip_by_phase"}) << told(d);
   EXPECT_NE(d.causes.even_push.find("goes by phase"), std::string::npos) << told(d);
+}
+
+// What differs between two phases that alternate may pass for a memory below zero, which the answer says.
+TEST(MachineAnswers, SayThatAMemoryBelowZeroAlternatesAsPhasesDo) {
+  double before = 0;
+  std::size_t trial = 0;
+  MachineRuns runs = scalar_runs(50, 20, 1.5, 0.02, 8, [&](double x, double z, std::size_t t) {
+    before = (t == trial ? -0.6 * before : 0) + 0.8 * z;
+    trial = t;
+    return 0.8 * x + 0.3 + 0.2 * before;
+  });
+  runs.phases = {"left", "right"};
+  for (MachineTrial& one : runs.trials)
+    for (std::size_t k = 0; k < one.rows.size(); ++k) one.rows[k].phase = static_cast<int>(k % 2);
+  const auto said = [](const Diagnosis& d) { return d.causes.size.find("phases left and right"); };
+  const Diagnosis d = answer_to(linear_machine(0.02), runs, {"memory", "b_spread"});
+  ASSERT_EQ(d.causes.set, std::vector<std::string>{"memory"}) << told(d);
+  EXPECT_NE(said(d), std::string::npos) << told(d);
+  for (MachineTrial& one : runs.trials)
+    for (std::size_t k = 0; k < one.rows.size(); ++k) one.rows[k].phase = static_cast<int>(k / 2 % 2);
+  EXPECT_EQ(said(answer_to(linear_machine(0.02), std::move(runs), {"memory", "b_spread"})), std::string::npos);
+}
+
+// A drum that coasts down by itself, and loses a constant amount more than its model at every step: far more than its
+// changes scatter by.
+TEST(MachineAnswers, GiveNoNameToALargeConstantLoss) {
+  Machine machine = linear_machine(0.1);
+  machine.parameters = {{"kept", 0.9985, 0.0001}, {"s", 0.02, 0.02, 0.0005, 1}};
+  machine.effects = {{"drag", {{"more", 0, 0, 0.02}}}};
+  machine.may_vary = {"kept"};
+  machine.step = [](const MachineBatch& batch) {
+    for (std::size_t i = 0; i < batch.rows; ++i)
+      batch.next[i] =
+          (batch.value(0, i) - batch.value(2, i)) * batch.states[i] - 0.1 + batch.value(1, i) * batch.scores[i];
+  };
+  MachineRuns runs = scalar_runs(10, 30, 0, 0.1, 4, [](double x, double z, std::size_t t) {
+    const double from = x < 10 ? 150 + 80 * static_cast<double>((7 * t) % 10) : x;  // The first value is about 0.
+    return 0.9985 * from - 0.7 + 0.02 * z;
+  });
+  for (MachineTrial& trial : runs.trials) trial.rows.erase(trial.rows.begin());
+  const Diagnosis d = answer_to(machine, std::move(runs), {});
+  EXPECT_EQ(d.verdict, Verdict::unexplained) << told(d);
+  EXPECT_NE(d.causes.even_push.find("(x -0.6)"), std::string::npos) << d.causes.even_push;
+}
+
+// One long run that was cut into trials: the order of trials goes with the speed.
+TEST(MachineAnswers, TellNoDriftWhereTheOrderOfTrialsGoesWithTheState) {
+  Machine machine = linear_machine(0.1);
+  double now = 900;
+  MachineRuns runs;
+  for (int t = 0; t < 20; ++t) {
+    runs.trials.emplace_back();
+    for (int k = 0; k < 30; ++k) runs.trials.back().rows.push_back({.seen = {now = 0.998 * now}});
+  }
+  const auto design = std::make_shared<const MachineDesign>(machine_design(machine, runs));
+  const auto drift = [](const std::vector<MachineCandidate>& all) {
+    return std::ranges::find(all, "b_drift", [](const MachineCandidate& one) { return one.candidate.id; })
+        ->candidate.undecidable;
+  };
+  EXPECT_NE(drift(machine_effects(machine, design)).find("goes with x"), std::string::npos);
+  // The same trials in another order.
+  for (std::size_t t = 0; t < runs.trials.size(); ++t) std::swap(runs.trials[t], runs.trials[(7 * t) % 20]);
+  const auto mixed = std::make_shared<const MachineDesign>(machine_design(machine, runs));
+  EXPECT_EQ(drift(machine_effects(machine, mixed)), "");
+}
+
+TEST(MachineAnswers, AskAboutGlitchesAndFailuresThatTheModelLacks) {
+  const Machine machine = linear_machine(0.1);
+  MachineRuns runs =
+      scalar_runs(10, 20, 1.5, 0.1, 6, [](double x, double z, std::size_t) { return 0.8 * x + 0.3 + 0.2 * z; });
+  EXPECT_TRUE(far_values(machine, runs).empty());
+  runs.trials[3].rows[7].seen[0] = 12;
+  ASSERT_EQ(far_values(machine, runs).size(), 1u);
+  EXPECT_EQ(far_values(machine, runs).front().find("x is 12 in trial 4, row 8, far from"), 0u)
+      << far_values(machine, runs).front();
+  runs.trials[3].rows[7].seen[0] = -999;
+  EXPECT_EQ(message_of([&] { far_values(machine, runs); }),
+            "x is -999 in trial 4, row 8, more than 100 times as far from the row before as the column spans "
+            "otherwise: give NaN for a value that is missing");
+  runs.trials[3].rows[7].seen[0] = 1.5;
+  runs.trials[2].outcome = MachineOutcome::failed;
+  const std::vector<std::string> notes =
+      machine_as_stated(std::make_shared<const Machine>(machine), std::move(runs))->notes();
+  EXPECT_TRUE(std::ranges::any_of(notes, [](const std::string& note) {
+    return note.find("one trial is said to have failed, but the step fails from no measured row") == 0;
+  }));
 }
 
 // A command acts one step after it was given, as through an actuator that lags; a sensor that errs more says less.
