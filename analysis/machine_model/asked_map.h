@@ -11,12 +11,12 @@
 
 namespace metastable::analysis {
 
-// A column whose values are this many times what the map makes of them is in another unit; the factor is met within a
-// share.
+/// A column whose values are this many times what the map makes of them is in another unit; the factor is met within a
+/// share.
 struct UnitFactor {
   double factor;
-  const char* words;       // of what is compared with the machine
-  const char* words_here;  // of trials that are compared with the others
+  const char* words;       ///< of what is compared with the machine
+  const char* words_here;  ///< of trials that are compared with the others
 };
 inline constexpr UnitFactor unit_factors[]{
     {180 / std::numbers::pi, "degrees where the machine has radians", "degrees where the others are in radians"},

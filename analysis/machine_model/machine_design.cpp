@@ -27,10 +27,13 @@ constexpr std::size_t fewest_jumps = 3, jumps_to_moves = 10;
 // column that goes far beyond its first values tells the slopes by its later ones.
 constexpr double most_error = 0.5;
 constexpr std::size_t most_codes = 8;  // An input of more values is a number even if all are whole.
-// Values this far from both neighbours, in spans of the column, are asked about, and refused: a recorded -999.
-constexpr double far_spans = 3, farthest_spans = 100;
-constexpr std::size_t fewest_to_span = 40;  // So many values tell a column's span.
-constexpr std::size_t fewest_first = 5;     // So many first values tell a spread.
+// Values this far from both neighbours, in spans of the column, are asked about; beyond the second number the usual
+// marks for missing values are refused.
+constexpr double far_spans = 3, mark_spans = 20;
+constexpr std::array marks{99.0, 999.0, 9999.0, 99999.0, 999999.0};  // of either sign
+constexpr std::size_t fewest_to_span = 40;                           // So many values tell a column's span.
+constexpr double least_within = 0.5;     // A state makes this share of its way within trials where one run was cut.
+constexpr std::size_t fewest_first = 5;  // So many first values tell a spread.
 
 // Fills in means and spreads of the columns.
 void measure_columns(MachineDesign& design, const Machine& machine, const MachineRuns& runs) {
@@ -53,19 +56,24 @@ void measure_columns(MachineDesign& design, const Machine& machine, const Machin
   }
 }
 
-// Correlates a column, over the steps at which it was measured, with the order of trials.
+// Correlates a column, over the steps at which it was measured, with the order of trials, where most of its way over
+// all trials is made within these.
 double along_order(const MachineDesign& design, const MachineRuns& runs, std::size_t sensor) {
-  double count = 0, x = 0, y = 0, xx = 0, yy = 0, xy = 0;
+  double count = 0, x = 0, y = 0, xx = 0, yy = 0, xy = 0, within = 0, before = 0, began = 0;
   for (const StepPlace& at : design.steps) {
-    if (std::isnan(runs.trials[at.trial].rows[static_cast<std::size_t>(at.number) - 1].seen[sensor])) continue;
-    const double run = at.run, seen = at.seen[sensor];
+    const double seen = runs.trials[at.trial].rows[static_cast<std::size_t>(at.number) - 1].seen[sensor];
+    if (std::isnan(seen)) continue;
+    if (count == 0) began = seen;
+    if (at.number > 1 && count > 0) within += seen - before;
+    before = seen;
+    const double run = at.run, y_here = at.seen[sensor];
     ++count;
-    x += run, y += seen;
-    xx += run * run, yy += seen * seen, xy += run * seen;
+    x += run, y += y_here;
+    xx += run * run, yy += y_here * y_here, xy += run * y_here;
   }
-  if (count == 0) return 0;
-  const double square = (xx - x * x / count) * (yy - y * y / count);
-  return square > 0 ? (xy - x * y / count) / std::sqrt(square) : 0;
+  const double square = count > 0 ? (xx - x * x / count) * (yy - y * y / count) : 0;
+  if (!(square > 0) || !(within / (before - began) > least_within)) return 0;
+  return (xy - x * y / count) / std::sqrt(square);
 }
 
 // Measures the first values of trials that take a step.
@@ -156,6 +164,18 @@ std::size_t jumps_by(const MachineRuns& runs, std::size_t sensor, double turn) {
   return span > least_span * turn && span < within_turn * turn && jumps >= jumps_to_moves * moves ? jumps : 0;
 }
 
+// Returns the range of a column between its percents 1 and 99; of none where it has few values.
+std::pair<double, double> usual_range(const MachineRuns& runs, std::size_t sensor) {
+  std::vector<double> values;
+  for (const MachineTrial& trial : runs.trials)
+    for (const MachineRow& row : trial.rows)
+      if (!std::isnan(row.seen[sensor])) values.push_back(row.seen[sensor]);
+  if (values.size() < fewest_to_span) return {0, 0};
+  std::ranges::sort(values);
+  const std::size_t aside = values.size() / 100 + 1;
+  return {values[aside], values[values.size() - 1 - aside]};
+}
+
 bool same(const MachineTrial& a, const MachineTrial& b) {
   if (a.rows.size() != b.rows.size() || a.rows.size() < 3) return false;
   for (std::size_t k = 0; k < a.rows.size(); ++k)
@@ -171,39 +191,35 @@ bool same(const MachineTrial& a, const MachineTrial& b) {
 std::vector<std::string> far_values(const Machine& machine, const MachineRuns& runs) {
   std::vector<std::string> asked;
   for (std::size_t j = 0; j < machine.observe.size(); ++j) {
-    std::vector<double> values;
-    for (const MachineTrial& trial : runs.trials)
-      for (const MachineRow& row : trial.rows)
-        if (!std::isnan(row.seen[j])) values.push_back(row.seen[j]);
-    if (values.size() < fewest_to_span) continue;
-    std::ranges::sort(values);
-    const std::size_t aside = values.size() / 100 + 1;
-    const double span = values[values.size() - 1 - aside] - values[aside];
+    const auto [low, high] = usual_range(runs, j);
+    const double span = high - low;
+    if (!(span > 0)) continue;
     std::size_t count = 0;
-    double farthest = 0, value = 0;
-    std::string where;
+    double farthest = 0;
+    std::string is;
     for (std::size_t t = 0; t < runs.trials.size(); ++t)
-      for (std::size_t k = 1; k + 1 < runs.trials[t].rows.size(); ++k) {
+      for (std::size_t k = 0; k < runs.trials[t].rows.size(); ++k) {
         const std::vector<MachineRow>& rows = runs.trials[t].rows;
-        const double to = rows[k].seen[j] - rows[k - 1].seen[j], from = rows[k].seen[j] - rows[k + 1].seen[j];
+        const double seen = rows[k].seen[j], beyond = std::max(low - seen, seen - high);
+        const auto where = [&] {
+          return fmt::format("{} is {:g} in trial {}, row {}, where it goes from {:.3g} to {:.3g} otherwise",
+                             machine.observe[j].state, seen, runs.name_of(t), k + 1, low, high);
+        };
+        if (beyond > mark_spans * span && std::ranges::find(marks, std::abs(seen)) != marks.end())
+          throw std::invalid_argument(where() + ": give NaN for a value that is missing");
+        if (k == 0 || k + 1 == rows.size()) continue;
+        const double to = seen - rows[k - 1].seen[j], from = seen - rows[k + 1].seen[j];
         if (!(to * from > 0) || !(std::min(std::abs(to), std::abs(from)) > far_spans * span)) continue;
         ++count;
-        if (!(std::abs(to) > farthest)) continue;
-        farthest = std::abs(to);
-        value = rows[k].seen[j];
-        where = fmt::format("trial {}, row {}", runs.name_of(t), k + 1);
+        if (!(beyond > farthest)) continue;
+        farthest = beyond;
+        is = where();
       }
-    if (count == 0 || !(span > 0)) continue;
-    const std::string is = fmt::format("{} is {:g} in {}", machine.observe[j].state, value, where);
-    if (farthest > farthest_spans * span)
-      throw std::invalid_argument(
-          fmt::format("{}, more than {:g} times as far from the row before as the column "
-                      "spans otherwise: give NaN for a value that is missing",
-                      is, farthest_spans));
-    asked.push_back(
-        fmt::format("{}{}, far from the rows before and behind: is it a glitch of the sensor? Give NaN "
-                    "there; else it may pass for outliers of a noise",
-                    is, count > 1 ? fmt::format(" (one of {} such rows)", count) : ""));
+    if (count > 0)
+      asked.push_back(
+          fmt::format("{}{}: is it a glitch of the sensor? Give NaN there; else it may pass for outliers of "
+                      "a noise",
+                      is, count > 1 ? fmt::format(" (one of {} such rows)", count) : ""));
   }
   return asked;
 }

@@ -32,6 +32,7 @@ struct InputCourse {
   bool changes = false;  ///< it changes within a trial
 };
 
+inline constexpr std::size_t trials_of_a_spread = 5;  ///< So many tell what differs from trial to trial.
 inline constexpr std::size_t input_lags = 3;  ///< steps of which StepPlace::inputs holds the inputs: 0, 1 and 2 before
 
 /// The values that a sensor has in the first rows of trials.
@@ -69,7 +70,7 @@ std::vector<std::string> doubled_trials(const MachineRuns& runs);
 
 /// Asks, in a sentence for each sensor, about values that lie far from the rows before and behind them: beyond three
 /// times what the column spans between its percents 1 and 99.
-/// @throws std::invalid_argument where one lies beyond a hundred times that
+/// @throws std::invalid_argument for marks of missing values (99, -999, 9999 and the like) beyond twenty times that
 std::vector<std::string> far_values(const Machine& machine, const MachineRuns& runs);
 
 /// Asks, in a sentence each, about sensors whose values seem to wrap: they stay within a turn (2 pi, or 360) and jump

@@ -13,10 +13,9 @@ namespace {
 
 using Values = std::vector<double>;
 
-constexpr double fine_step = 1e-4;        // of a range, for differences
-constexpr double widest_change = 0.5;     // of a nominal value, or
-constexpr double most_sds = 5;            //   of the sd with which it is known: how far a parameter may vary
-constexpr std::size_t fewest_trials = 5;  // whose spread is told
+constexpr double fine_step = 1e-4;     // of a range, for differences
+constexpr double widest_change = 0.5;  // of a nominal value, or
+constexpr double most_sds = 5;         //   of the sd with which it is known: how far a parameter may vary
 // Frequencies of a clock lie half a period of the record apart, where a sine between two of them shows nine tenths of
 // itself in the nearer one. All parameters that may vary share 512 frequencies: those of a single one reach 256 periods
 // in the record.
@@ -150,7 +149,7 @@ class Varying {
     one.candidate.parameters = {change()};
     one.candidate.report = reporting({}, {"change_over_the_runs"});
     if (design_.trials < 3) one.candidate.undecidable = "a drift over the runs takes three trials";
-    for (std::size_t j = 0; j < design_.along_order.size(); ++j)
+    for (std::size_t j = 0; one.candidate.undecidable.empty() && j < design_.along_order.size(); ++j)
       if (std::abs(design_.along_order[j]) > most_along_order)
         one.candidate.undecidable = fmt::format(
             "the order of trials goes with {} (correlation {:.2f}), as where one long run was cut into trials: what "
@@ -166,8 +165,8 @@ class Varying {
       return std::vector<NamedValue>{{"sd_between_trials", std::sqrt(std::max(0.0, v[0]))}};
     };
     one.candidate.form_of = [](const Values& v) { return FittedForm{{}, {v[0] * v[0]}}; };
-    if (design_.trials < fewest_trials)
-      one.candidate.undecidable = fmt::format("a spread between trials takes {} of them", fewest_trials);
+    if (design_.trials < trials_of_a_spread)
+      one.candidate.undecidable = fmt::format("a spread between trials takes {} of them", trials_of_a_spread);
     one.apply = [value = value_](MachineHypothesis& h, const Values&, const Values& v) {
       if (v[0] > 0) h.spreads.push_back({value, std::sqrt(v[0])});
     };
@@ -285,10 +284,12 @@ MachineCandidate lag(const Machine& machine, const MachineDesign& design, std::s
   one.candidate.parameters = {{0, 0, longest_lag, fine_step * longest_lag}};
   one.candidate.seek_far = true;
   one.candidate.report = reporting({}, {"steps"});
-  if (design.inputs[input].code)
-    one.candidate.undecidable =
-        machine.inputs[input] + " has few values, all whole, and is taken for a code: a hundredth of it is not";
-  if (!design.inputs[input].changes) one.candidate.undecidable = machine.inputs[input] + " changes within no trial";
+  if (!design.inputs[input].changes)
+    one.candidate.undecidable = machine.inputs[input] + " changes within no trial";
+  else if (design.inputs[input].code)
+    one.candidate.undecidable = machine.inputs[input] +
+                                " has few values, all whole, and is taken for a code (a gear, a leg), which has no "
+                                "values in between; given in another unit, as a hundredth, it is none";
   one.apply = [input, inputs = machine.inputs.size()](MachineHypothesis& h, const Values&, const Values& v) {
     h.lag.resize(inputs);
     h.lag[input] = v[0];
@@ -371,8 +372,8 @@ MachineCandidate launch_effect(const std::string& id, const LaunchSeen& seen) {
   one.candidate.exact = true;
   if (!seen.stated)
     one.candidate.undecidable = "no launch is stated of it";
-  else if (seen.measured && seen.first.count < fewest_trials)
-    one.candidate.undecidable = fmt::format("it takes {} trials whose first row has it", fewest_trials);
+  else if (seen.measured && seen.first.count < trials_of_a_spread)
+    one.candidate.undecidable = fmt::format("it takes {} trials whose first row has it", trials_of_a_spread);
   return one;
 }
 
@@ -455,7 +456,8 @@ std::string alternating_memory(const MachineDesign& design, std::span<const Effe
     if (design.steps[k].trial == design.steps[k - 1].trial && design.steps[k].phase == design.steps[k - 1].phase)
       return {};
   return fmt::format(
-      "A memory below zero alternates from step to step, and so do the phases {} and {}: what differs between these may "
+      "A memory below zero alternates from step to step, and so do the phases {} and {}: what differs between these "
+      "may "
       "pass for it.",
       design.phases[0], design.phases[1]);
 }

@@ -39,8 +39,8 @@ struct MachineHypothesis {
   /// A state that is pushed after each step by a weight times a number that differs from trial to trial.
   struct PushSpread {
     std::size_t state;
-    double sd;                       // of that number
-    std::vector<double> transition;  // weights
+    double sd;                       // It is that of the number.
+    std::vector<double> transition;  // These are the weights.
   };
 
   std::vector<double> values;  ///< parameters and the effects' parameters

@@ -18,8 +18,7 @@ using Weight = std::function<double(const StepPlace&, std::size_t parameter)>;
 constexpr double largest_push = 1, largest_even_push = 3;
 constexpr double largest_scatter = 1;  // of the logarithm of the scores' spread
 constexpr double step = 1e-3;
-constexpr std::size_t fewest_swinging = 5;  // trials, whose own swings are told
-constexpr int waves = 3;                    // along the way, and over the runs
+constexpr int waves = 3;  // along the way, and over the runs
 
 // Something swings: frequencies are tried so far apart [cycles a step], below the fastest that steps can show. What a
 // launch sets swinging comes to rest within about so many steps.
@@ -60,7 +59,7 @@ std::vector<Facet> facets(const Machine& machine, const MachineDesign& design) {
     all.push_back({"phase", design.phases.size() - 1,
                    [](const StepPlace& at, std::size_t i) { return at.phase == static_cast<int>(i) ? 1.0 : 0.0; },
                    of_two(design.phases.size(), "phase")});
-  if (design.trials > 4)
+  if (design.trials >= trials_of_a_spread)
     all.push_back(
         {"order of trials", 2 * waves, [](const StepPlace& at, std::size_t i) { return wave(at.run + 0.5, i); }});
   all.push_back({"step number", 2, [](const StepPlace& at, std::size_t i) {
@@ -132,9 +131,9 @@ void let_swing(Variation& one) {
 // What every launch sets swinging alike pushes all states that are measured.
 MachineVariation swing_from_launch(const Machine& machine, std::shared_ptr<const MachineDesign> design) {
   MachineVariation one = even_push(machine, design);
-  one.variation.facet = "swing from the launch";
+  one.variation.facet = "a swing from the launch";
   one.variation.aspect = "mean";
-  one.variation.candidate.id = "swing from the launch";
+  one.variation.candidate.id = "a swing from the launch";
   const std::vector<FreeParameter> parts = one.variation.candidate.parameters;
   std::ranges::copy(parts, std::back_inserter(one.variation.candidate.parameters));
   let_swing(one.variation);
@@ -153,7 +152,7 @@ MachineVariation swing_from_launch(const Machine& machine, std::shared_ptr<const
 MachineVariation swing_in_trial(const Machine& machine, std::shared_ptr<const MachineDesign> design, std::size_t sensor,
                                 double most) {
   const std::string& name = machine.observe[sensor].state;
-  MachineVariation one = variation({"swing in each trial", 1, {}}, "mean " + name, most);
+  MachineVariation one = variation({"a swing in each trial", 1, {}}, "mean " + name, most);
   one.variation.candidate.parameters = {{0, 0, most * most, 1e-6 * most * most, 1e-2 * most * most}};
   let_swing(one.variation);
   one.apply = [design, state = machine.state_index(name)](MachineHypothesis& h, const Values& variant,
@@ -189,7 +188,7 @@ std::vector<MachineVariation> machine_variations(const Machine& machine, std::sh
     all.push_back(std::move(one));
   }
   all.push_back(swing_from_launch(machine, design));
-  for (std::size_t j = 0; design->trials >= fewest_swinging && j < machine.observe.size(); ++j)
+  for (std::size_t j = 0; design->trials >= trials_of_a_spread && j < machine.observe.size(); ++j)
     all.push_back(swing_in_trial(machine, design, j, largest_push * usual_change(*design, j)));
   return all;
 }

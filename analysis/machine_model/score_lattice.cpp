@@ -170,7 +170,8 @@ constexpr std::size_t on_a_lattice = 2;
 // failure.
 struct Told {
   std::vector<double> bends, fails;
-  bool ever = false;  // some point failed
+  bool ever = false;      // A point with one score failed,
+  bool together = false;  // or one with two.
 };
 
 // The measured states, those that were not measured at their launch's mean, or else at the mean of their column.
@@ -195,7 +196,8 @@ std::vector<Eigen::VectorXd> measured_states(const Machine& machine, const Machi
   return all;
 }
 
-// Points of one row: the middle, pairs at sqrt 3, pairs far out, and one for each two scores together.
+// Points of one row: the middle, pairs at sqrt 3, pairs far out, and for each two scores together one above, then three
+// others.
 std::vector<Eigen::VectorXd> tried_scores(Eigen::Index scores) {
   std::vector<Eigen::VectorXd> all{Eigen::VectorXd::Zero(scores)};
   for (Eigen::Index m = 0; m < scores; ++m)
@@ -204,6 +206,10 @@ std::vector<Eigen::VectorXd> tried_scores(Eigen::Index scores) {
   for (Eigen::Index m = 0; m < scores; ++m)
     for (Eigen::Index o = 0; o < m; ++o)
       all.push_back(tried_score * (Eigen::VectorXd::Unit(scores, m) + Eigen::VectorXd::Unit(scores, o)));
+  for (Eigen::Index m = 0; m < scores; ++m)
+    for (Eigen::Index o = 0; o < m; ++o)
+      for (const auto& [up, along] : {std::pair{1, -1}, std::pair{-1, 1}, std::pair{-1, -1}})
+        all.push_back(tried_score * (up * Eigen::VectorXd::Unit(scores, m) + along * Eigen::VectorXd::Unit(scores, o)));
   return all;
 }
 
@@ -240,6 +246,8 @@ void look(Told& told, const MachineStepper& stepper, std::size_t first, const st
       told.fails[m] += stepper.failed(first + 1 + 4 * m + z) != stepper.failed(first);
       told.ever = told.ever || stepper.failed(first + 1 + 4 * m + z);
     }
+  for (std::size_t point = cross; point < cross + 2 * scores * (scores - 1); ++point)
+    told.together = told.together || stepper.failed(point);
 }
 
 // Scores that fail come first, then those that bend most.
@@ -248,11 +256,14 @@ ScorePlan planned(const Told& told, std::size_t failed) {
   ScorePlan plan;
   const auto most = std::ranges::max_element(told.fails);
   const bool fails = told.ever || *most > 0;
+  if (told.together && !fails)
+    throw std::runtime_error(
+        "step: it fails only where two noises are large together; the likelihood follows failures along one noise");
   if (failed > 0 && !fails)
-    plan.notes.push_back(
-        fmt::format("{} said to have failed, but the step fails from no measured row, whatever its "
-                    "noise: the model of the machine cannot fail there",
-                    failed == 1 ? "one trial is" : fmt::format("{} trials are", failed)));
+    plan.notes.push_back(fmt::format(
+        "{} said to have failed, but the step fails from no measured row within {:g} sds of its noise: the model of "
+        "the machine hardly fails there",
+        failed == 1 ? "one trial is" : fmt::format("{} trials are", failed), far_score));
   if (failed > 0 || fails) {
     plan.failing = static_cast<std::size_t>(most - told.fails.begin());
     plan.lattice.push_back(*plan.failing);

@@ -110,7 +110,8 @@ class FailsFromMostRows : public std::invalid_argument {
 /// it fails within four and a half sds of its scores or did fail.
 /// @param nominal  without spreads and memory: a measured row is all of a point
 /// @throws std::invalid_argument for a hypothesis with these, where the map returns no finite state from a measured
-///   row  @throws FailsFromMostRows where it fails from most of them
+///   row  @throws FailsFromMostRows where it fails from most of them; std::runtime_error where it fails at two scores
+///   together alone
 ScorePlan score_plan(const Machine& machine, const MachineRuns& runs, const MachineHypothesis& nominal);
 
 }  // namespace metastable::analysis

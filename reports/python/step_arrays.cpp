@@ -77,10 +77,11 @@ py::object call_step(const std::function<py::object()>& step, const std::string&
                                 called, arrays, said));
     // NumPy says size-1, length-1 or 0-dimensional, by its version.
     if (error.matches(PyExc_TypeError) && said.starts_with("only ") && said.find("Python scalar") != std::string::npos)
-      raise_instead(error, "InputTypeError",
-                    fmt::format("{}: it makes one number of an array, {} functions of NumPy have to take the place of "
-                                "float and of those of math ({})",
-                                called, arrays, said));
+      raise_instead(
+          error, "InputTypeError",
+          fmt::format("{}: it makes one number of an array, {} numpy.sin has to take the place of math.sin, and "
+                      "float() none ({})",
+                      called, arrays, said));
     throw;
   }
 }

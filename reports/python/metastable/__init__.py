@@ -683,8 +683,8 @@ class Walker:
         if not numpy.isfinite(start).all():
             raise InputError(f"start: finite numbers expected, not {start.flat[numpy.isfinite(start).argmin()]}")
         object.__setattr__(self, "start", _plain(start))
-        object.__setattr__(self, "names", words(self.names, "names"))
-        object.__setattr__(self, "noise_names", words(self.noise_names, "noise_names"))
+        object.__setattr__(self, "names", words(self.names, "names", ordered=True))
+        object.__setattr__(self, "noise_names", words(self.noise_names, "noise_names", ordered=True))
         if isinstance(self.angles, str) or not isinstance(self.angles, Iterable):
             raise InputTypeError(f"angles: names or places in a list expected, not {self.angles!r}")
         object.__setattr__(self, "angles", tuple(self._place(angle) for angle in self.angles))

@@ -63,7 +63,7 @@ def row_of_numbers(value, least, most, what, which=""):
 def require_call(function, count, what, called):
     """Refuses a function that cannot be called with `count` arguments."""
     try:
-        signature = inspect.signature(function)
+        signature = inspect.signature(function, follow_wrapped=False)
     except (TypeError, ValueError):  # Functions that are no Python need not tell theirs.
         return
     try:

@@ -119,6 +119,23 @@ TEST(MachineAnswers, GiveNoNameToALargeConstantLoss) {
   EXPECT_NE(d.causes.even_push.find("(x -0.6)"), std::string::npos) << d.causes.even_push;
 }
 
+// The likelihood follows failures along one noise.
+TEST(MachineAnswers, RefuseAStepThatFailsWhereTwoNoisesAreLargeTogether) {
+  Machine machine = linear_machine(0.1);
+  machine.scores = 2;
+  machine.step = [](const MachineBatch& batch) {
+    for (std::size_t i = 0; i < batch.rows; ++i) {
+      const double* z = &batch.scores[2 * i];
+      batch.next[i] = 0.8 * batch.states[i] + 0.3 + 0.2 * z[0] + 0.1 * z[1];
+      batch.failed[i] = z[0] > 1.2 && z[1] < -1.2;
+    }
+  };
+  const MachineRuns runs =
+      scalar_runs(10, 20, 1.5, 0.1, 6, [](double x, double z, std::size_t) { return 0.8 * x + 0.3 + 0.2 * z; });
+  EXPECT_EQ(message_of<std::runtime_error>([&] { machine_as_stated(std::make_shared<const Machine>(machine), runs); }),
+            "step: it fails only where two noises are large together; the likelihood follows failures along one noise");
+}
+
 // One long run that was cut into trials: the order of trials goes with the speed.
 TEST(MachineAnswers, TellNoDriftWhereTheOrderOfTrialsGoesWithTheState) {
   Machine machine = linear_machine(0.1);
@@ -138,6 +155,12 @@ TEST(MachineAnswers, TellNoDriftWhereTheOrderOfTrialsGoesWithTheState) {
   for (std::size_t t = 0; t < runs.trials.size(); ++t) std::swap(runs.trials[t], runs.trials[(7 * t) % 20]);
   const auto mixed = std::make_shared<const MachineDesign>(machine_design(machine, runs));
   EXPECT_EQ(drift(machine_effects(machine, mixed)), "");
+  // A drift that moves the state from trial to trial is told.
+  const MachineRuns drifting = scalar_runs(40, 12, 1.5, 0.01, 3, [](double x, double z, std::size_t t) {
+    return (x > 0 ? 0.5 * x : 0) + 0.5 + 0.8 * static_cast<double>(t) / 39 + 0.01 * z;
+  });
+  const auto moved = std::make_shared<const MachineDesign>(machine_design(machine, drifting));
+  EXPECT_EQ(drift(machine_effects(machine, moved)), "");
 }
 
 TEST(MachineAnswers, AskAboutGlitchesAndFailuresThatTheModelLacks) {
@@ -147,18 +170,22 @@ TEST(MachineAnswers, AskAboutGlitchesAndFailuresThatTheModelLacks) {
   EXPECT_TRUE(far_values(machine, runs).empty());
   runs.trials[3].rows[7].seen[0] = 12;
   ASSERT_EQ(far_values(machine, runs).size(), 1u);
-  EXPECT_EQ(far_values(machine, runs).front().find("x is 12 in trial 4, row 8, far from"), 0u)
+  EXPECT_EQ(far_values(machine, runs).front().find("x is 12 in trial 4, row 8, where it goes from"), 0u)
       << far_values(machine, runs).front();
-  runs.trials[3].rows[7].seen[0] = -999;
-  EXPECT_EQ(message_of([&] { far_values(machine, runs); }),
-            "x is -999 in trial 4, row 8, more than 100 times as far from the row before as the column spans "
-            "otherwise: give NaN for a value that is missing");
+  for (const double mark : {-999.0, 9999.0}) {
+    runs.trials[3].rows[7].seen[0] = runs.trials[3].rows[8].seen[0] = mark;  // two rows, one behind the other
+    EXPECT_NE(message_of([&] { far_values(machine, runs); }).find("otherwise: give NaN for a value that is missing"),
+              std::string::npos);
+  }
+  runs.trials[3].rows[7].seen[0] = runs.trials[3].rows[8].seen[0] = 500;  // That is a machine's business.
+  EXPECT_TRUE(far_values(machine, runs).empty());
+  runs.trials[3].rows[8].seen[0] = 1.5;
   runs.trials[3].rows[7].seen[0] = 1.5;
   runs.trials[2].outcome = MachineOutcome::failed;
   const std::vector<std::string> notes =
       machine_as_stated(std::make_shared<const Machine>(machine), std::move(runs))->notes();
   EXPECT_TRUE(std::ranges::any_of(notes, [](const std::string& note) {
-    return note.find("one trial is said to have failed, but the step fails from no measured row") == 0;
+    return note.find("one trial is said to have failed, but the step fails from no measured row within 4.5 sds") == 0;
   }));
 }
 

@@ -60,7 +60,7 @@ TEST_P(Swings, AreSaidBesideAnEffect) {
   EXPECT_EQ(d.causes.set, std::vector<std::string>{"b_drift"}) << verdict_told(d);
   EXPECT_GT(d.causes.p_unnamed, 0.9) << verdict_told(d);
   ASSERT_FALSE(d.causes.unnamed_facets.empty());
-  EXPECT_EQ(d.causes.unnamed_facets.front().facet, GetParam() ? "swing in each trial" : "swing from the launch");
+  EXPECT_EQ(d.causes.unnamed_facets.front().facet, GetParam() ? "a swing in each trial" : "a swing from the launch");
 }
 
 INSTANTIATE_TEST_SUITE_P(MachineVariations, Swings, testing::Bool(),
