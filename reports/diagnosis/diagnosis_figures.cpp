@@ -22,6 +22,7 @@ using analysis::GapMap;
 
 constexpr double full_colour = 6;  // score beyond which colours do not change
 constexpr std::size_t bars_at_most = 8;
+constexpr std::size_t letters_of_a_line = 28;  // They take half of a figure's width.
 constexpr std::size_t most_return_maps = 6;
 constexpr std::size_t furthest_rows = 8, least_rows = 3, most_rows = 14;  // of one figure
 // A place is shown alone where its score is beyond this: of some hundred that are chance, one in three maps has such
@@ -305,6 +306,26 @@ std::vector<Figure> profile_figures(const Diagnosis& d) {
   return figures;
 }
 
+namespace {
+
+// Breaks the name of a set of effects into lines that leave room for the bars.
+std::string in_lines(const std::string& name) {
+  std::string all;
+  std::size_t line = 0;  // where the last one begins
+  for (std::size_t from = 0; from < name.size();) {
+    const std::size_t plus = name.find('+', from), to = plus == std::string::npos ? name.size() : plus + 1;
+    if (from > 0 && all.size() - line + to - from > letters_of_a_line) {
+      all += '\n';
+      line = all.size();
+    }
+    all += name.substr(from, to - from);
+    from = to;
+  }
+  return all;
+}
+
+}  // namespace
+
 std::vector<Figure> ranking_figures(const Diagnosis& d) {
   std::vector<std::tuple<double, std::string, int>> all{{d.causes.p_no_gap, "no gap", floor_colour},
                                                         {d.causes.p_recalibrate, "recalibration", recalibrated_colour},
@@ -315,12 +336,14 @@ std::vector<Figure> ranking_figures(const Diagnosis& d) {
   BarChart bars{.name = {}, .value = {}};
   for (const auto& [probability, name, colour] : all) {
     if (bars.name.size() == bars_at_most || (bars.name.size() >= 3 && probability < worded_probability)) break;
-    bars.name.push_back(name);
+    bars.name.push_back(in_lines(name));
     bars.value.push_back(probability);
     bars.colour.push_back(colour);
   }
+  std::ptrdiff_t lines = 0;  // of the bar that has most
+  for (const std::string& name : bars.name) lines = std::max(lines, 1 + std::ranges::count(name, '\n'));
   Figure figure{.id = "ranking", .title = "Causes", .x = {.label = "probability", .low = 0, .high = 1.15}, .y = {""}};
-  figure.height = std::max(130 + 30 * static_cast<int>(bars.name.size()), shrinkage_height);
+  figure.height = std::max(130 + static_cast<int>((10 + 21 * lines) * std::ssize(bars.name)), shrinkage_height);
   figure.bars = std::move(bars);
   return {figure};
 }

@@ -34,12 +34,14 @@ constexpr std::string_view font_family = "Helvetica,Arial,sans-serif";
 
 /// Makes a gnuplot string that nothing in it can end or expand. Single quotes expand nothing but cannot begin or end
 /// with a quote of the text; double ones hold it, and all that they would expand, as octal numbers.
-std::string quote(std::string_view text) {
-  const char mark = text.find('\'') == std::string_view::npos ? '\'' : '"';
+/// @param lines  ends of lines are kept
+std::string quote(std::string_view text, bool lines = false) {
+  const bool plain = text.find('\'') == std::string_view::npos && !(lines && text.find('\n') != std::string_view::npos);
+  const char mark = plain ? '\'' : '"';
   std::string quoted(1, mark);
   for (const char c : text) {
     if (c == '\n')
-      quoted += ' ';
+      quoted += lines ? "\\n" : " ";
     else if (mark == '"' && std::string_view("'\"\\`").find(c) != std::string_view::npos)
       quoted += fmt::format("\\{:03o}", static_cast<unsigned>(c));
     else
@@ -52,7 +54,7 @@ std::string quote(std::string_view text) {
 std::string tick(std::string_view text) {
   std::string doubled;
   for (const char c : text) doubled += c == '%' ? std::string("%%") : std::string(1, c);
-  return quote(doubled);
+  return quote(doubled, true);
 }
 
 std::string axis_label(const FigureAxis& axis) {

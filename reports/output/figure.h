@@ -74,7 +74,7 @@ struct HeatMap {
 
 /// Holds named horizontal bars from zero, the first on top, each with its value at the end.
 struct BarChart {
-  std::vector<std::string> name;
+  std::vector<std::string> name;  ///< each may have several lines
   std::vector<double> value;
   std::vector<double> lower = {}, upper = {};  ///< intervals as whiskers; empty: none. NaN: none at this bar
   std::vector<int> colour = {};                ///< of the palette, one a bar; empty: all alike

@@ -243,6 +243,8 @@ TEST(Figure, BarsAreNamedAndValuedTopDown) {
     EXPECT_NE(script.find(part), std::string::npos) << part << "\n" << script;
   const std::string svg = render_svg(figure);
   EXPECT_NE(svg.find("leg_contact"), std::string::npos);  // not taken for a subscript
+  figure.bars->name[0] = "leg_contact+\ninertia";
+  EXPECT_NE(gnuplot_script(figure).find("(\"leg_contact+\\ninertia\" 0,"), std::string::npos) << gnuplot_script(figure);
   figure.bars->value.pop_back();
   EXPECT_THROW(gnuplot_script(figure), std::invalid_argument);
 }
