@@ -188,8 +188,8 @@ std::vector<MachineVariation> machine_variations(const Machine& machine, std::sh
     all.push_back(std::move(one));
   }
   all.push_back(swing_from_launch(machine, design));
-  // A swing of its own in each trial takes a likelihood for every frequency and state in each scan. Where calls are
-  // dear, several states would take half of all that a diagnosis asks for.
+  // A swing of its own in each trial takes a likelihood for every frequency and state in each scan, and more points in
+  // each: three states, a tenth of all rows of a diagnosis. Where calls are dear they are spared.
   const bool many = machine.dear && machine.observe.size() > 1;
   for (std::size_t j = 0; !many && design->trials >= trials_of_a_spread && j < machine.observe.size(); ++j)
     all.push_back(swing_in_trial(machine, design, j, largest_push * usual_change(*design, j)));
