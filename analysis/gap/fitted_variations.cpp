@@ -45,7 +45,7 @@ std::vector<LeftInFacet> fitted(const TransitionModel& model, const std::vector<
   const std::function<void()> beat = markov::one_at_a_time(heartbeat);
   double most = 0, best = 0;
   std::size_t done = 0;
-  // Where fits keep little of what was promised, others that promised less are fitted, too.
+  // Variations that promised less are fitted as well if the fits of those before them keep little of their promise.
   for (double least = std::max(0.0, promised[order[0]] - worth_fitting);; least = std::max(0.0, best - worth_fitting)) {
     std::size_t end = done;
     while (end < std::min(effort.most_leaders, order.size()) && promised[order[end]] > least) ++end;

@@ -24,7 +24,7 @@ inline constexpr UnitFactor unit_factors[]{
     {1000, "thousandths of the machine's unit", "thousandths of the others' unit"},
     {0.001, "thousands of the machine's unit", "thousands of the others' unit"}};
 
-/// What is to be said of a map, sentence by sentence.
+/// The findings about a map that a user is told, sentence by sentence.
 struct MapAsked {
   std::vector<std::string> idle_noise;   ///< numbers of the noise that change nothing
   std::vector<std::string> other_units;  ///< columns that may be in another unit than the machine's

@@ -128,7 +128,7 @@ void let_swing(Variation& one) {
   one.candidate.refine = {swings_apart};
 }
 
-// What every launch sets swinging alike pushes all states that are measured.
+// A swing that every launch sets off alike pushes all states that are measured.
 MachineVariation swing_from_launch(const Machine& machine, std::shared_ptr<const MachineDesign> design) {
   MachineVariation one = even_push(machine, design);
   one.variation.facet = "a swing from the launch";

@@ -76,7 +76,7 @@ TEST(MachineAnswers, NameAParameterThatDiffersBetweenTwoPhases) {
   EXPECT_NE(d.causes.even_push.find("goes by phase"), std::string::npos) << told(d);
 }
 
-// What differs between two phases that alternate may pass for a memory below zero, which the answer says.
+// A difference between two phases that alternate may pass for a memory below zero, and the answer says so.
 TEST(MachineAnswers, SayThatAMemoryBelowZeroAlternatesAsPhasesDo) {
   double before = 0;
   std::size_t trial = 0;

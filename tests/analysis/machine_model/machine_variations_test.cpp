@@ -1,4 +1,4 @@
-// What varies without a name, in runs of a machine that something swings in.
+// The variations without a name are found in runs of a machine in which something swings.
 
 #include "analysis/machine_model/machine_variations.h"
 
@@ -51,7 +51,7 @@ std::string verdict_told(const Diagnosis& d) {
   return all;
 }
 
-// What swings is said beside the drift, which keeps its name.
+// A swing is said to be there beside the drift, which keeps its name.
 class Swings : public testing::TestWithParam<bool> {};
 
 TEST_P(Swings, AreSaidBesideAnEffect) {
