@@ -152,11 +152,12 @@ std::vector<std::string> notes_on_roughness(const Fitted& fitted, const Diagnosi
         "more, and gains over them (2 Δ ln L) may be {:.2g} too large",
         recalibrated.reason, recalibrated.promised, 2 * recalibrated.promised));
   if (!fitted.ranking.scan.trials_suffice)
-    notes.push_back(fmt::format(
-        "{} {} of {} transitions on average: chance levels come from the model's information alone; from {} trials "
-        "of {} transitions on, from the trials' own scatter",
-        data.trials, data.trials == 1 ? "trial" : "trials", data.events / std::max<std::size_t>(1, data.trials),
-        Rules::enough_trials, Rules::enough_transitions));
+    notes.push_back(
+        fmt::format("{} trial{} of {} {}s on average: what chance does is told by the model alone; from {} trials of a "
+                    "few {}s on, by "
+                    "how trials scatter, which is surer",
+                    data.trials, data.trials == 1 ? "" : "s", data.collisions / std::max<std::size_t>(1, data.trials),
+                    data.step_name, Rules::enough_trials, data.step_name));
   return notes;
 }
 
@@ -167,7 +168,9 @@ std::optional<Fit> other_recalibration(const TransitionModel& model, const Fit& 
   for (const RankedCause& cause : ranking.singles)
     if (cause.fitted() && (!leader || cause.gain > leader->gain)) leader = &cause;
   if (!leader) return {};
-  Fit other = fit(model, leader->fit.nuisance, {});
+  FitOptions options;
+  options.to_beat = recalibrated.penalised;
+  Fit other = fit(model, leader->fit.nuisance, {}, options);
   if (other.penalised > recalibrated.penalised + converged_rise + converged_share * std::max(0.0, leader->gain))
     return other;
   return {};

@@ -64,8 +64,10 @@ void say_unnamed(std::vector<std::string>& s, const Diagnosis& d) {
   if (facet->evidence < worth_saying) return;
   const std::string how =
       most->beside.empty() ? "By itself" : fmt::format("Beside {}", fmt::join(most->beside, " and "));
-  s.push_back(facet->aspect == "correlation"
-                  ? how + " it makes the errors of two columns go together."
+  s.push_back(facet->aspect == "correlation" ? how + " it makes the errors of two columns go together."
+              : facet->facet == facet_of_all || (facet->facet == "phase" && d.data.collides())
+                  ? fmt::format("{} it acts on the {} of all {}.", how, facet->aspect,
+                                facet->stance ? "stances" : d.data.step_name + "s")
                   : fmt::format("{} it acts by {}, on the {} of {}.", how, facet->facet, facet->aspect,
                                 facet->stance ? "stances" : d.data.step_name + "s"));
 }
@@ -251,6 +253,8 @@ std::string where_in_words(const GapCell& cell, const std::string& step_name) {
     return fmt::format("what the {}s of a trial have in common ({:+.2g} {})", step_name, cell.size, cell.unit);
   if (cell.aspect == "spread" && cell.size >= 1)
     return fmt::format("the spread of {} ({:.2g} times the model's)", at, 1 + cell.size);
+  if (cell.aspect == "spread" && cell.size <= -1)
+    return fmt::format("the spread of {} (far less than the model's)", at);
   if (cell.aspect == "spread")
     return fmt::format("the spread of {} ({:.2g} % {} than the model's)", at, 100 * std::abs(cell.size),
                        cell.size < 0 ? "less" : "more");

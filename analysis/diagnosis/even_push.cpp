@@ -18,9 +18,12 @@ std::optional<EvenPush> fitted_even_push(const TransitionModel& model, const Fit
   if (!push || !best.fitted()) return {};
   const EffectScan scan = scan_effects(model, recalibrated, {push}, threads);
   if (scan.effects.empty()) return {};
-  Fit pushed = fit_one_more(model, effort_for(model, recalibrated), recalibrated, scan.effects.front());
+  Fit pushed = fit_one_more(model, effort_for(model, recalibrated), recalibrated, scan.effects.front(), true);
   // A noise that a recalibration widened to take up the push may hide it; the hypothesis found its way out of that.
-  Fit again = fit(model, best.fit.nuisance, pushed.terms);
+  FitOptions options;
+  options.ends_as_foretold = true;
+  options.to_beat = pushed.penalised;
+  Fit again = fit(model, best.fit.nuisance, pushed.terms, options);
   if (again.penalised > pushed.penalised) pushed = std::move(again);
   EvenPush all{pushed.terms.back().values, 2 * (pushed.penalised - recalibrated.penalised),
                2 * (best.fit.penalised - recalibrated.penalised)};

@@ -155,7 +155,9 @@ std::vector<double> drawn_steps(const TransitionModel& model, const TransitionMo
   double all = 0;
   for (const WeighedFit& one : fits) all += one.weight;
   std::vector<double> steps(static_cast<std::size_t>(draws));
-  const auto drawn = [&](std::size_t i) {
+  const std::function<void()> beat = markov::one_at_a_time(heartbeat);
+  model.side_by_side(steps.size(), threads, [&](std::size_t i) {
+    beat();
     // Each fit has its share of the draws, in their order.
     const double place = (static_cast<double>(i) + 0.5) / static_cast<double>(draws) * all;
     std::size_t k = 0;
@@ -163,8 +165,7 @@ std::vector<double> drawn_steps(const TransitionModel& model, const TransitionMo
     const Fit fit = drawn_fit(model, *fits[k].fit, seed, i);
     const std::unique_ptr<TransitionModel> again = at.relaunched(seed + 1 + i);
     steps[i] = (again ? *again : at).expected_steps(fit.nuisance, fit.terms, seed + 1 + i);
-  };
-  markov::parallel_for(steps.size(), threads, drawn, [&](double) { heartbeat(); });
+  });
   return steps;
 }
 

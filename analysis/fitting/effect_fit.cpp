@@ -58,7 +58,8 @@ bool is_far_off(const std::vector<double>& scores) {
   return sum > count * widest + sds * std::sqrt(2 * count);
 }
 
-// Fits the best variant from its neutral values. The scan took its slopes there, which the first step then uses.
+// Fits the best variant from its neutral values, and from the model's own starts. The scan took its slopes at the
+// neutral values, which the first step from there then uses.
 Fit fit_from_neutral(const TransitionModel& model, const Fit& base, const ScannedEffect& scanned, FitOptions options) {
   std::vector<EffectTerm> terms = base.terms;
   terms.push_back({scanned.candidate, scanned.candidate->variants[scanned.best], {}});
@@ -72,7 +73,7 @@ Fit fit_from_neutral(const TransitionModel& model, const Fit& base, const Scanne
   joined.steps.insert(joined.steps.end(), scanned.columns.steps.begin(), scanned.columns.steps.end());
   options.evaluation = &base.evaluation;
   options.derivatives = &joined;
-  return fit(model, base.nuisance, terms, options);
+  return best_fit(model, base.nuisance, terms, options);
 }
 
 // Searches for the best variant of the last term, between the variants that the catalogue lists.
@@ -188,13 +189,14 @@ Fit fit_one_more(const TransitionModel& model, const Effort& effort, const Fit& 
   for (const std::size_t variant : leading_variants(scanned, effort.most_variants)) {
     std::vector<EffectTerm> terms = base.terms;
     terms.push_back(term_at(scanned, variant));
-    Fit tried = moderate && variant == scanned.best && model.starts(terms).empty()
-                    ? fit_from_neutral(model, base, scanned, options)
-                    : best_fit(model, base.nuisance, terms, options);
+    Fit tried = moderate && variant == scanned.best ? fit_from_neutral(model, base, scanned, options)
+                                                    : best_fit(model, base.nuisance, terms, options);
     const auto try_from = [&](auto value_of) {
       for (std::size_t p = 0; p < terms.back().values.size(); ++p)
         terms.back().values[p] = value_of(scanned.candidate->parameters[p]);
-      Fit again = fit(model, base.nuisance, terms, options);
+      FitOptions from_there = options;
+      from_there.to_beat = tried.penalised;
+      Fit again = fit(model, base.nuisance, terms, from_there);
       if (again.penalised > tried.penalised) tried = std::move(again);
     };
     if (tried.penalised < base.penalised)  // a bad start: from nothing instead

@@ -59,6 +59,23 @@ void add_promising(const RankingProblem& problem, const EffectScan& scan, const 
     tries.push_back({leader, std::move(second)});
 }
 
+// Lists the leading effects without those whose fits leave the same scores as a stronger one's: what stands beside
+// these stands beside that one, and complete_pairs() puts them in its place.
+std::vector<std::size_t> unlike_leaders(const RankingProblem& problem, const SingleEffects& singles) {
+  std::vector<std::size_t> all;
+  for (const std::size_t i : leading_effects(problem, singles)) {
+    const std::vector<double>& own = singles.causes[i].fit.evaluation.score;
+    const auto alike = [&](std::size_t stronger) {
+      const std::vector<double>& other = singles.causes[stronger].fit.evaluation.score;
+      double apart = 0;
+      for (std::size_t e = 0; e < own.size(); ++e) apart += (own[e] - other[e]) * (own[e] - other[e]);
+      return apart < problem.rules.told_apart;
+    };
+    if (std::ranges::none_of(all, alike)) all.push_back(i);
+  }
+  return all;
+}
+
 // Scans the pairs asked for, whatever the scores promise.
 void add_asked_pairs(const RankingProblem& problem, SingleEffects& singles,
                      const std::vector<std::pair<const Candidate*, const Candidate*>>& asked, std::vector<Try>& tries) {
@@ -230,7 +247,7 @@ EffectPairs rank_effect_pairs(const RankingProblem& problem, SingleEffects singl
   EffectPairs ranked{std::move(singles), {}};
   ScansBeside beside(problem);
   std::vector<Try> tries;
-  for (const std::size_t leader : leading_effects(problem, ranked.singles))
+  for (const std::size_t leader : unlike_leaders(problem, ranked.singles))
     add_promising(problem, beside.of(ranked.singles, leader), ranked.singles, leader, tries);
   add_asked_pairs(problem, ranked.singles, options.pairs, tries);
   chosen();

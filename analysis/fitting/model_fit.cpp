@@ -19,9 +19,16 @@ constexpr double unresolved = 0.5, unresolved_share = 1e-4;
 // Shares of the information's diagonal that are added to it. Where a step rises by less than this share of what it
 // promised, the next one is damped more.
 constexpr double dampings[] = {0, 1e-4, 1e-3, 1e-2, 0.1, 1}, least_kept = 0.25;
-// A step that foretold no more than this rise of the log likelihood, and rose by that up to this share, leaves next to
-// nothing: of the order of that share squared.
-constexpr double small_rise = 3, as_foretold = 0.1;
+// A step that missed the rise that it foretold by a share of it leaves a rise of the order of that share squared. Where
+// this is below the first number, and it foretold less than the second, next to nothing is left: fits of walkers were
+// left with a fifth to all of the estimate.
+constexpr double next_to_nothing_left = 0.03, moderate_rise = 50;
+// A fit that would have to rise by so much more, and by twice what its last step missed, to come to a likelihood that
+// is known stops below it.
+constexpr double worth_beating = 0.1;
+// A promise below the first number is kept up to the second share of it.
+constexpr double small_promise = 5, kept_promise = 1.5;
+constexpr const char* stays_below = "it stays below what another fit has reached";
 constexpr int most_halvings = 7, few_halvings = 3;  // of a step; of one that is damped more where another failed
 // A step that rises by so many times what it foretold is too short. It is made longer, by so many times at most.
 constexpr double much_more = 1.25, longest = 8;
@@ -242,6 +249,11 @@ struct Stride {
   double foretold = 0;  // by the last step that was tried
   double risen = 0;     // in truth
   bool better = false;  // or nothing is promised
+
+  bool leaves_nothing() const {
+    const double missed = risen - foretold;
+    return better && foretold < moderate_rise && missed * missed < next_to_nothing_left * foretold;
+  }
 };
 
 // A climb of the penalised likelihood by damped steps. `fit` holds the evaluation and the slopes where it stands.
@@ -251,6 +263,13 @@ class Climb {
       : point_(point), weights_(weights), fit_(fit), best_(counted(fit.evaluation, weights) + point.log_prior()) {}
 
   double best() const { return best_; }
+
+  // Says whether a small promise, even if more than kept, leaves the likelihood below a value that is known.
+  bool stays_below(double known, const FreeParts& parts) const {
+    Stride stride;
+    step_of(parts.all, 0, stride);
+    return stride.foretold < small_promise && best_ + kept_promise * stride.foretold < known;
+  }
 
   // Moves all parameters together; where that fails, the effects' and the nuisances' by themselves, and all of them
   // by steps that are damped more. @param resolved  a promise below it is not resolved
@@ -409,13 +428,21 @@ Fit fit(const TransitionModel& model, const std::vector<double>& nuisance, const
       result.converged = true;
       break;
     }
+    if (climb.stays_below(options.to_beat, parts)) {
+      result.reason = stays_below;
+      break;
+    }
     // What is promised below this differences do not resolve.
     const double resolved = unresolved + unresolved_share * (climb.best() - start);
     const Stride stride = climb.stride(parts, resolved, reach);
     result.promised = stride.promised;
-    if (options.ends_as_foretold && stride.better && stride.foretold < small_rise &&
-        std::abs(stride.risen - stride.foretold) < as_foretold * stride.foretold) {
+    if (options.ends_as_foretold && stride.leaves_nothing()) {
       result.converged = true;
+      break;
+    }
+    if (stride.better &&
+        climb.best() + 2 * std::abs(stride.risen - stride.foretold) < options.to_beat + worth_beating) {
+      result.reason = stays_below;
       break;
     }
     if (!stride.better && stride.promised >= resolved && reach != Reach::wide) {
@@ -486,13 +513,18 @@ Fit best_fit(const TransitionModel& model, const std::vector<double>& nuisance, 
   });
   std::optional<Fit> found;
   if (!suffice) found = fit(model, nuisance, terms, options);
+  FitOptions elsewhere = options;
+  elsewhere.evaluation = nullptr;
+  elsewhere.derivatives = nullptr;
   for (const FitStart& start : starts) {
-    Fit tried = fit(model, start.nuisance, moved_to(start), options);
+    if (found) elsewhere.to_beat = found->penalised;
+    Fit tried = fit(model, start.nuisance, moved_to(start), elsewhere);
     if (!found || tried.penalised > found->penalised || !std::isfinite(found->penalised)) found = std::move(tried);
   }
   Fit best = std::move(*found);
   if (!starts.empty() && !best.converged && std::isfinite(best.penalised)) {  // the last stretch of the way
-    FitOptions longer = options;
+    FitOptions longer = elsewhere;
+    longer.to_beat = FitOptions{}.to_beat;
     longer.most_iterations *= 3;
     best = fit(model, best.nuisance, best.terms, longer);
   }

@@ -2,6 +2,7 @@
 // Fits nuisances and effects of a transition model by penalised maximum likelihood.
 
 #include <Eigen/Core>
+#include <limits>
 #include <string>
 #include <vector>
 
@@ -61,6 +62,9 @@ struct FitOptions {
   bool last_variant_too = false;
   /// If true, a step that rises about as it foretold is the last. The fit's derivatives are those before it, then.
   bool ends_as_foretold = false;
+  /// A penalised likelihood that is known from elsewhere. A fit that cannot come to it any more is given up, and has
+  /// not converged.
+  double to_beat = -std::numeric_limits<double>::infinity();
 };
 
 /// Finds the maximum of the penalised likelihood by Gauss-Newton steps on the scores: with z the normal score and J =
@@ -77,6 +81,7 @@ Fit fit(const TransitionModel& model, const std::vector<double>& nuisance, const
 std::vector<double> given_values(const TransitionModel& model);
 
 /// Returns the better of the fits from the given values and from the model's own starts (TransitionModel::starts).
+/// @param options  an evaluation and derivatives are those of the given values
 Fit best_fit(const TransitionModel& model, const std::vector<double>& nuisance, const std::vector<EffectTerm>& terms,
              const FitOptions& options = {});
 

@@ -123,8 +123,9 @@ void refit_from_stated(const RankingProblem& problem, SingleEffects& singles) {
     if (!cause.fitted() || cause.terms[0].candidate->parameters.empty() ||
         !near_the_top(singles, cause, restarted_share) || cause.fit.log_likelihood - cause.fit.penalised < strained)
       return;
-    Fit other = fit(problem.model, stated, cause.terms,
-                    {.count = {}, .refit_nuisances = true, .most_iterations = problem.effort.most_iterations});
+    FitOptions options{.count = {}, .refit_nuisances = true, .most_iterations = problem.effort.most_iterations};
+    options.to_beat = cause.fit.penalised;
+    Fit other = fit(problem.model, stated, cause.terms, options);
     if (other.penalised > cause.fit.penalised) singles.take(problem, i, std::move(other));
   });
   singles.update_top();

@@ -106,7 +106,7 @@ void add_unmapped(Facets& facets, const TransitionModel& model, const std::vecto
 
 // How many of all collisions are far ones is the form of the contact's distribution, which no law holds to be normal:
 // restitution with a skewness of .7 shows there and nowhere else. Rare contacts of another kind are an effect by name.
-bool is_form_of_contact(const GapCell& cell) { return cell.facet == "phase" && cell.aspect == "tail" && !cell.stance; }
+bool is_form_of_contact(const GapCell& cell) { return cell.of_all() && cell.aspect == "tail" && !cell.stance; }
 
 // Weighs the columns' sums by what they scatter without a gap, in the directions that the fitted parameters leave.
 LeftInFacet judge(const Key& key, const Eigen::MatrixXd& dense, const Eigen::VectorXd& sums,

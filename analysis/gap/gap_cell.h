@@ -7,9 +7,19 @@
 
 namespace metastable::analysis {
 
+/// The facet of cells that hold all events, where stances and collisions are not separate.
+inline constexpr const char* facet_of_all = "all";
+
+/// Says whether a cell holds all stances, all collisions, or all events where these are not separate. A machine's phases
+/// are in words of their own: "phase 2".
+inline bool holds_all(const std::string& facet, const std::string& at) {
+  return facet == facet_of_all || (facet == "phase" && !at.starts_with("phase "));
+}
+
 /// A cell of the map says how far one aspect is off in one place.
 struct GapCell {
-  /// Cells are sorted by speed, leg, position, collision, trial, time, phase, condition, outcome or pair of columns.
+  /// Cells are sorted by speed, leg, position, collision, trial, time, phase, condition, outcome or pair of columns;
+  /// those of facet_of_all hold all events.
   std::string facet;
   std::string aspect;          ///< mean, spread, tail, memory, correlation
   std::string at;              ///< the cell in words, with its phase where stance and collision are separate
@@ -25,6 +35,7 @@ struct GapCell {
   /// and of trials as a whole, "share of collisions" of rests.
   std::string unit;
   std::size_t events = 0;
+  bool of_all() const { return holds_all(facet, at); }
 };
 
 struct GapMap {

@@ -83,7 +83,7 @@ std::map<std::tuple<bool, bool, std::size_t>, double> excess_by_phase(const std:
                                                                       const TransitionModel& model) {
   std::map<std::tuple<bool, bool, std::size_t>, double> excess;
   for (std::size_t k = 0; k < columns.size(); ++k) {
-    if (cells[k].facet != "phase" || columns[k].measure != Measure::spread) continue;
+    if (!cells[k].of_all() || columns[k].measure != Measure::spread) continue;
     double sum = 0, squares = 0;
     for (const auto& [event, value] : columns[k].terms) sum += value, squares += value * value;
     const auto n = static_cast<double>(columns[k].terms.size());

@@ -71,7 +71,10 @@ class Cutter {
       groups("condition", members, where, [this](const Event& e) {
         return std::optional(std::pair{static_cast<int>(e.condition), model_.condition_name(e.condition)});
       });
-    cells_.push_back({"phase", stance ? "stance" : two_phases_ ? "collision" : "step" + where, members, stance});
+    if (two_phases_)
+      cells_.push_back({"phase", stance ? "stance" : "collision", members, stance});
+    else  // A machine's phases are what a wheel's legs are.
+      cells_.push_back({facet_of_all, "step" + where, members, stance});
     for (std::size_t c = first; c < cells_.size(); ++c) cells_[c].stance = stance;
   }
   // Groups are collisions 1, 2, 3 to 4, ..., 13 to 16, and those from 17.

@@ -91,7 +91,7 @@ void add_cells(MapColumns& all, const TransitionModel& model, const std::vector<
     }
     all.add(cell, "mean", word, in_speed, std::move(mean));  // the size follows with the statistic
     all.add(cell, "spread", "of the model's", 0, std::move(spread));
-    if (cell.facet == "phase") all.add(cell, "tail", "share", beyond / n, std::move(tail));
+    if (holds_all(cell.facet, cell.at)) all.add(cell, "tail", "share", beyond / n, std::move(tail));
   }
 }
 

@@ -34,6 +34,11 @@ constexpr std::array marks{99.0, 999.0, 9999.0, 99999.0, 999999.0};  // of eithe
 constexpr std::size_t fewest_to_span = 40;                           // So many values tell a column's span.
 constexpr double least_within = 0.5;     // A state makes this share of its way within trials where one run was cut.
 constexpr std::size_t fewest_first = 5;  // So many first values tell a spread.
+// A number is asked about that is there at least so often, in this share of the rows, at so many usual steps from the
+// rows beside it; rows are, where this share of them repeats the row before; both where this share of the other values
+// is there once.
+constexpr std::size_t fewest_marks = 5;
+constexpr double mark_share = 0.02, mark_steps = 3, repeated_share = 0.2, nearly_all = 0.9;
 
 // Fills in means and spreads of the columns.
 void measure_columns(MachineDesign& design, const Machine& machine, const MachineRuns& runs) {
@@ -311,9 +316,84 @@ std::vector<std::string> doubled_trials(const MachineRuns& runs) {
                       doubled, runs.trials.size())};
 }
 
+namespace {
+
+// Counts the values of a column, and how often the most frequent of them is there.
+struct ValueCounts {
+  std::map<double, std::size_t> times;
+  std::size_t values = 0;
+  std::pair<double, std::size_t> most{0, 0};
+
+  // Says whether nearly all others are there once, as those of a continuous column are.
+  bool others_differ(std::size_t without) const {
+    return static_cast<double>(times.size()) > nearly_all * static_cast<double>(values - without);
+  }
+};
+
+ValueCounts counted_values(const MachineRuns& runs, std::size_t sensor) {
+  ValueCounts counted;
+  for (const MachineTrial& trial : runs.trials)
+    for (const MachineRow& row : trial.rows)
+      if (const double x = row.seen[sensor]; !std::isnan(x)) {
+        ++counted.values;
+        if (const std::size_t now = ++counted.times[x]; now > counted.most.second) counted.most = {x, now};
+      }
+  return counted;
+}
+
+// Returns the median distance of a column's neighbouring rows, of those of which one is `mark`, or of the others.
+double usual_step(const MachineRuns& runs, std::size_t sensor, double mark, bool from_mark) {
+  std::vector<double> steps;
+  for (const MachineTrial& trial : runs.trials)
+    for (std::size_t k = 1; k < trial.rows.size(); ++k) {
+      const double before = trial.rows[k - 1].seen[sensor], here = trial.rows[k].seen[sensor];
+      if (!std::isnan(before - here) && (before == mark || here == mark) == from_mark)
+        steps.push_back(std::abs(here - before));
+    }
+  return steps.empty() ? 0 : median(std::move(steps));
+}
+
+// A mark for a missing value is the same number again and again, off the rows beside it, among values that all differ.
+std::vector<std::string> marks_among_values(const Machine& machine, const MachineRuns& runs) {
+  std::vector<std::string> asked;
+  for (std::size_t j = 0; j < machine.observe.size(); ++j) {
+    const ValueCounts counted = counted_values(runs, j);
+    const auto [mark, times] = counted.most;
+    if (times < fewest_marks || static_cast<double>(times) < mark_share * static_cast<double>(counted.values) ||
+        !counted.others_differ(times) ||
+        !(usual_step(runs, j, mark, true) > mark_steps * usual_step(runs, j, mark, false)))
+      continue;
+    asked.push_back(
+        fmt::format("{}: it is {:g} in {} rows, off the rows beside them, where other values are hardly there "
+                    "twice; NaN says that a value is missing: is it a mark for that?",
+                    machine.observe[j].state, mark, times));
+  }
+  return asked;
+}
+
+// Rows that repeat the row before to the last digit, where values are hardly there twice otherwise.
+std::vector<std::string> repeated_rows(const Machine& machine, const MachineRuns& runs) {
+  std::size_t repeated = 0, pairs = 0;
+  for (const MachineTrial& trial : runs.trials)
+    for (std::size_t k = 1; k < trial.rows.size(); ++k) {
+      ++pairs;
+      repeated += trial.rows[k].seen == trial.rows[k - 1].seen;  // Missing values are like none.
+    }
+  if (static_cast<double>(repeated) < repeated_share * static_cast<double>(pairs)) return {};
+  for (std::size_t j = 0; j < machine.observe.size(); ++j)
+    if (!counted_values(runs, j).others_differ(repeated)) return {};
+  return {
+      fmt::format("{} of {} rows repeat the row before to the last digit: is each row there twice, or was a sensor "
+                  "read more often than it measures?",
+                  repeated, pairs)};
+}
+
+}  // namespace
+
 std::vector<std::string> questions_on_values(const Machine& machine, const MachineRuns& runs) {
   std::vector<std::string> asked = wrapping_columns(machine, runs);
-  std::ranges::copy(far_values(machine, runs), std::back_inserter(asked));
+  for (const auto& question : {far_values, marks_among_values, repeated_rows})
+    std::ranges::copy(question(machine, runs), std::back_inserter(asked));
   if (std::string question = unseen_launches(machine, runs); !question.empty()) asked.push_back(std::move(question));
   return asked;
 }

@@ -5,18 +5,16 @@
 
 #include <algorithm>
 #include <cmath>
-#include <deque>
 #include <functional>
 #include <iterator>
 #include <limits>
-#include <mutex>
 #include <set>
 #include <stdexcept>
-#include <unordered_map>
 #include <utility>
 
 #include "analysis/fitting/effect_fit.h"
 #include "analysis/fitting/effect_scan.h"
+#include "analysis/fitting/latest_evaluations.h"
 #include "analysis/fitting/model_fit.h"
 #include "analysis/fitting/rules.h"
 #include "analysis/machine_model/machine_design.h"
@@ -52,6 +50,10 @@ constexpr double strained_sds = 2, misstated_sds = 3;
 constexpr std::size_t most_instead = 3;
 constexpr double chance_sds = 2;  // So far from its mean chance takes what n numbers gain: n, with a variance of 2 n.
 
+// Failures that the model foretells in the steps recorded, from which trials that end early are asked about: none of so
+// many comes by chance in one data set of 150.
+constexpr double foretold_failures = 5;
+
 // Steps that are drawn for the expected steps, and failures that end them: 6 % of error. Below a few failures they say
 // next to nothing.
 constexpr double enough_steps = 30000, enough_failures = 300, few_failures = 10;
@@ -61,57 +63,6 @@ constexpr std::uint64_t seeds_apart = 0x9E3779B97F4A7C15;
 bool is_outliers(const EffectTerm& term) { return term.candidate->id == "outliers"; }
 
 double share_of(double logit) { return 1 / (1 + std::exp(-logit)); }
-
-// Holds the latest evaluations of a model: the stages of a diagnosis repeat each other's fits, which then go through
-// the same hypotheses. A copy starts without any, since it may be of other runs.
-class LatestEvaluations {
- public:
-  LatestEvaluations() = default;
-  LatestEvaluations(const LatestEvaluations&) {}
-  LatestEvaluations& operator=(const LatestEvaluations&) = delete;
-
-  // Returns the evaluation of a hypothesis, which `evaluate` makes unless it is held.
-  Evaluation of(std::span<const double> nuisance, std::span<const EffectTerm> terms,
-                const std::function<Evaluation()>& evaluate) {
-    const std::string key = key_of(nuisance, terms);
-    {
-      const std::lock_guard lock(mutex_);
-      if (const auto held = held_.find(key); held != held_.end()) return held->second;
-    }
-    Evaluation made = evaluate();
-    const std::lock_guard lock(mutex_);
-    if (!held_.emplace(key, made).second) return made;
-    order_.push_back(key);
-    const std::size_t each = 3 * sizeof(double) * made.score.size();
-    while (order_.size() > most_held || order_.size() * each > most_bytes) {
-      held_.erase(order_.front());
-      order_.pop_front();
-    }
-    return made;
-  }
-
- private:
-  static constexpr std::size_t most_held = 1000, most_bytes = 50'000'000;
-
-  // Returns all that tells one hypothesis from another. An effect is known by its id.
-  static std::string key_of(std::span<const double> nuisance, std::span<const EffectTerm> terms) {
-    std::string key;
-    const auto add = [&](std::span<const double> values) {
-      key.append(reinterpret_cast<const char*>(values.data()), values.size_bytes());
-    };
-    add(nuisance);
-    for (const EffectTerm& term : terms) {
-      key.append(term.candidate->id.c_str(), term.candidate->id.size() + 1);
-      add(term.variant);
-      add(term.values);
-    }
-    return key;
-  }
-
-  std::mutex mutex_;
-  std::unordered_map<std::string, Evaluation> held_;
-  std::deque<std::string> order_;  // The oldest comes first.
-};
 
 class MachineTransitions : public TransitionModel {
  public:
@@ -237,6 +188,7 @@ class MachineTransitions : public TransitionModel {
   std::unique_ptr<MachineTransitions> with_wide_priors() const;
   bool effect_speaks_for_what_is_stated(const Fit& recalibrated, const Fit& wide) const;
   void set_aside_what_is_misstated(const Fit& recalibrated);
+  void ask_for_outcomes(const std::vector<double>& nuisance);  // near which the recalibration lies
   std::vector<double> levels_of_own_draws(const std::vector<double>& nuisance) const;
   std::vector<std::string> effects_instead(const Fit& recalibrated) const;
   bool only_wild_rows(const Fit& recalibrated) const;
@@ -477,10 +429,31 @@ void MachineTransitions::set_aside_what_is_misstated(const Fit& recalibrated) {
     if (p.sd > 0) strain = std::max(strain, std::abs(recalibrated.nuisance[slot++] - p.nominal) / p.sd);
   if (!(strain > strained_sds)) return;
   const auto loose = with_wide_priors();
-  const Fit wide = fit(*loose, nominal_values(*loose), {});
+  Fit wide = fit(*loose, recalibrated.nuisance, {});
+  // What is stated may be too far off for steps from there to find the way, and a strained fit may lead elsewhere.
+  FitOptions from_stated;
+  from_stated.to_beat = wide.penalised;
+  if (Fit other = fit(*loose, nominal_values(*loose), {}, from_stated); other.penalised > wide.penalised)
+    wide = std::move(other);
   const std::vector<std::size_t> slots = misstated_slots(*loose, wide.nuisance);
   if (slots.empty() || effect_speaks_for_what_is_stated(recalibrated, wide)) return;
   for (const std::size_t one : slots) nuisances_[one].misstated = 1;
+}
+
+// Trials that end early where no outcome is stated may have failed: then the steps recorded hold too few failures.
+void MachineTransitions::ask_for_outcomes(const std::vector<double>& nuisance) {
+  if (!plan_.failing || std::ranges::any_of(runs_.trials, [](const MachineTrial& t) { return t.outcome.has_value(); }))
+    return;
+  const auto [shortest, longest] = std::ranges::minmax(runs_.trials, {}, [](const auto& t) { return t.rows.size(); });
+  double foretold = 0;
+  if (shortest.rows.size() < longest.rows.size())
+    for (const double chance : rest_chances(fit(*this, nuisance, {}).nuisance, {})) foretold += chance;
+  if (foretold < foretold_failures) return;
+  notes_.push_back(
+      fmt::format("outcome: the model fails in {:.0f} of the steps recorded, trials have {} to {} rows, and no outcome "
+                  "is stated: did "
+                  "those that end early fail (outcome \"failed\")?",
+                  foretold, shortest.rows.size(), longest.rows.size()));
 }
 
 // Returns, in ascending order, the levels of the measured values of runs drawn from the model: the share of values
@@ -593,6 +566,7 @@ std::unique_ptr<TransitionModel> machine_transitions(std::shared_ptr<const Machi
   auto model = std::make_unique<MachineTransitions>(refusing_nan(std::move(machine)), std::move(runs));
   const Fit recalibrated = best_fit(*model, nominal_values(*model), {});
   model->set_aside_what_is_misstated(recalibrated);
+  model->ask_for_outcomes(recalibrated.nuisance);
   return model;
 }
 

@@ -22,11 +22,15 @@ std::optional<std::pair<double, double>> interval(const ordered_json& j) {
   return std::pair{j[0].get<double>(), j[1].is_number() ? j[1].get<double>() : std::numeric_limits<double>::infinity()};
 }
 
-// The facet "phase" is the whole of a phase, and of walkers, whose phases are what a wheel's legs are, one of them.
+// The facet "phase" is the whole of a wheel's phase; of walkers, whose phases are what a wheel's legs are, it is one of
+// them, and the whole is "all".
 analysis::BlindAnswer::ClaimedPlace claimed_place(const ordered_json& w) {
   const auto facet = w.at("facet").get<std::string>();
   const bool leg = facet == "phase" && w.value("at", "").starts_with("phase ");
-  return {leg ? "leg" : facet, w.at("aspect").get<std::string>(), w.at("p_adjusted").get<double>()};
+  return {leg                               ? "leg"
+          : facet == analysis::facet_of_all ? "phase"
+                                            : facet,
+          w.at("aspect").get<std::string>(), w.at("p_adjusted").get<double>()};
 }
 
 }  // namespace

@@ -44,7 +44,7 @@ std::string row_name(const GapCell& cell) {
       if (end == name.size() || name[end] == ' ' || name[end] == ',') name.erase(at, mark.size());
     }
   if (cell.swing) return "largest swing with the time";
-  return cell.facet == "phase" ? "all" : name;
+  return cell.of_all() ? "all" : name;
 }
 
 struct ModelMap {

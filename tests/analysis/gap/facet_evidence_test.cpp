@@ -69,8 +69,8 @@ TEST(LeftOver, EventsThatScatterLittleAreNoSurer) {
   }
   const test::Line model(y, w);
   const std::vector<LeftInFacet> left = left_by_facet(model, fit(model, {3, -0.7}, {}), {}, Rules{});
-  const auto by_number = std::ranges::find_if(
-      left, [](const LeftInFacet& one) { return one.facet == "step" && one.aspect == "spread"; });
+  const auto by_number =
+      std::ranges::find_if(left, [](const LeftInFacet& one) { return one.facet == "step" && one.aspect == "spread"; });
   ASSERT_NE(by_number, left.end());
   EXPECT_GT(by_number->quadratic, 15);
   EXPECT_LT(by_number->quadratic, 32);
@@ -95,7 +95,7 @@ TEST(LeftOver, AFacetExplainsNoMoreThanWhatRemovesIt) {
 TEST(LeftOver, TheFormOfTheContactIsNoFacet) {
   int spreads = 0;
   for (const LeftInFacet& facet : left_of_line(31, 0))
-    if (facet.facet == "phase" && !facet.stance) {
+    if (facet.facet == facet_of_all) {
       EXPECT_NE(facet.aspect, "tail");
       spreads += facet.aspect == "spread";
     }

@@ -9,6 +9,7 @@
 #include <cmath>
 #include <memory>
 #include <numbers>
+#include <random>
 #include <string>
 #include <utility>
 #include <vector>
@@ -16,6 +17,7 @@
 #include "analysis/diagnosis/diagnosis.h"
 #include "analysis/fitting/effect_scan.h"
 #include "analysis/fitting/model_fit.h"
+#include "analysis/machine_model/machine_design.h"
 #include "analysis/statistics/random.h"
 #include "dynamics/numerics/truncated_normal.h"
 #include "tests/analysis/machine_model/machines.h"
@@ -94,6 +96,91 @@ TEST(MachineTransitions, AParameterThatIsStatedTooSurelyIsNoEffect) {
   EXPECT_NE(sentence.find("of its stated sds from 0.9: known less well than stated"), std::string::npos);
   EXPECT_NE(sentence.find("damping (d 0.0"), std::string::npos) << sentence;
   EXPECT_EQ(sentence.find("b is"), std::string::npos) << sentence;
+}
+
+// A swing: it decays, is pumped by a noise, and fails where it goes beyond 1.5.
+Machine pumped_swing(double stated_pump) {
+  Machine machine;
+  machine.states = {"swing_rad"};
+  machine.parameters = {{"decay", 0.08, 0.01}, {"pump", stated_pump, 0.01}, {"pump_sd", 0.3, 0.2, 0.02, 2}};
+  machine.effects = {{"air", {{"per_rad", 0, 0, 0.5}}}};
+  machine.may_vary = {"pump", "decay"};
+  machine.observe = {{"swing_rad", 0.005, 0}};
+  machine.step = [](const MachineBatch& batch) {
+    for (std::size_t i = 0; i < batch.rows; ++i) {
+      const double swing = batch.states[i];
+      batch.next[i] = swing * std::exp(-batch.value(0, i)) +
+                      batch.value(1, i) * (1 + batch.value(2, i) * batch.scores[i]) - batch.value(3, i) * swing * swing;
+      batch.failed[i] = batch.next[i] > 1.5;
+    }
+  };
+  return machine;
+}
+
+// Returns runs of the swing with another pump, in which trials end where it fails, with their outcomes or without.
+MachineRuns swings(double pump, unsigned seed, bool outcomes) {
+  std::mt19937_64 generator(seed);
+  std::normal_distribution<double> normal;
+  MachineRuns runs;
+  for (int t = 0; t < 40; ++t) {
+    MachineTrial& trial = runs.trials.emplace_back();
+    double swing = 0.3 + 0.1 * normal(generator);
+    for (int k = 0; k < 20 && swing <= 1.5; ++k) {
+      trial.rows.emplace_back().seen = {swing + 0.005 * normal(generator)};
+      swing = swing * std::exp(-0.08) + pump * (1 + 0.3 * normal(generator));
+    }
+    if (outcomes) trial.outcome = swing > 1.5 ? MachineOutcome::failed : MachineOutcome::stopped;
+  }
+  return runs;
+}
+
+// No step from what is stated leads a fit to a pump of seven sds away; its likelihood there passed for that of all
+// pumps.
+TEST(MachineTransitions, AParameterFarFromWhereItIsStatedIsSetAside) {
+  const auto machine = std::make_shared<const Machine>(pumped_swing(0.05));
+  for (const unsigned seed : {10U, 11U, 12U, 14U}) {
+    const auto model = machine_transitions(machine, swings(0.12, seed, true));
+    EXPECT_EQ(model->nuisances()[1].misstated, 1) << seed;
+    const Fit recalibrated = best_fit(*model, nominal_values(*model), {});
+    EXPECT_NEAR(recalibrated.nuisance[1], 0.12, 0.012) << seed;
+    ASSERT_EQ(model->misstated(recalibrated).size(), 1U);
+    EXPECT_TRUE(model->misstated(recalibrated).front().starts_with("pump is 0.1")) << seed;
+  }
+}
+
+TEST(MachineTransitions, TrialsThatEndEarlyWithoutAnOutcomeAreAskedAbout) {
+  const auto asked = [&](double pump, bool outcomes) {
+    const auto model =
+        machine_transitions(std::make_shared<const Machine>(pumped_swing(pump)), swings(pump, 3, outcomes));
+    return std::ranges::any_of(model->notes(), [](const std::string& note) {
+      return note.starts_with("outcome: the model fails in") && note.ends_with('?');
+    });
+  };
+  EXPECT_TRUE(asked(0.15, false));
+  EXPECT_FALSE(asked(0.15, true));
+  EXPECT_FALSE(asked(0.05, false));
+}
+
+// A number that is there again and again among values that all differ, and rows that repeat the row before.
+TEST(MachineTransitions, MarksAmongValuesAndRowsThereTwiceAreAskedAbout) {
+  const auto machine = std::make_shared<const Machine>(pumped_swing(0.05));
+  const auto asked = [&](const MachineRuns& runs) {
+    std::string all;
+    for (const std::string& question : questions_on_values(*machine, runs)) all += question;
+    return all;
+  };
+  MachineRuns runs = swings(0.05, 3, true);
+  EXPECT_EQ(asked(runs), "");
+  MachineRuns marked = runs, doubled = runs, rounded = runs;
+  for (MachineTrial& trial : marked.trials)
+    for (std::size_t k = 3; k < trial.rows.size(); k += 7) trial.rows[k].seen = {-1};
+  EXPECT_TRUE(asked(marked).starts_with("swing_rad: it is -1 in 120 rows")) << asked(marked);
+  for (MachineTrial& trial : doubled.trials)
+    for (std::size_t k = 1; k < trial.rows.size(); k += 2) trial.rows[k] = trial.rows[k - 1];
+  EXPECT_TRUE(asked(doubled).starts_with("400 of 760 rows repeat the row before")) << asked(doubled);
+  for (MachineTrial& trial : rounded.trials)  // A sensor that rounds repeats itself, too.
+    for (MachineRow& row : trial.rows) row.seen = {std::round(row.seen[0] * 10) / 10};
+  EXPECT_EQ(asked(rounded), "");
 }
 
 // A scatter of b between trials looks like an a near 1, ten of its stated sds off, from which no slope leads back.
