@@ -271,6 +271,12 @@ class Climb {
     return stride.foretold < small_promise && best_ + kept_promise * stride.foretold < known;
   }
 
+  // Says the same after a step, by what this missed. A likelihood that is above the known one is followed to its top.
+  bool gives_up(const Stride& stride, double known) const {
+    return stride.better && best_ <= known &&
+           best_ + 2 * std::abs(stride.risen - stride.foretold) < known + worth_beating;
+  }
+
   // Moves all parameters together; where that fails, the effects' and the nuisances' by themselves, and all of them
   // by steps that are damped more. @param resolved  a promise below it is not resolved
   Stride stride(const FreeParts& parts, double resolved, Reach reach) {
@@ -373,6 +379,17 @@ void fill_differences(const Evaluation& here, const Evaluation& there, double st
   }
 }
 
+namespace {
+
+// Fills in information and gradient by the fit's derivatives, and returns which parameters may move.
+FreeParts parts_by_slopes(Point& point, const Eigen::VectorXd& weights, Fit& fit) {
+  fit.information = information(fit.derivatives, fit.evaluation, weights);
+  fit.gradient = penalised_gradient(point.slots(), weights, fit);
+  return free_parts(point.slots(), fit.gradient, fit.information);
+}
+
+}  // namespace
+
 Fit stepped(const TransitionModel& model, const Fit& near, const std::vector<EffectTerm>& terms) {
   Point point(model, near.nuisance, terms, {});
   const Eigen::VectorXd weights = event_weights(model, {});
@@ -391,9 +408,7 @@ Fit stepped(const TransitionModel& model, const Fit& near, const std::vector<Eff
   };
   carry();
   for (int step = 0; step < rough_steps; ++step) {
-    result.information = information(result.derivatives, result.evaluation, weights);
-    result.gradient = penalised_gradient(point.slots(), weights, result);
-    if (!climb.step(free_parts(point.slots(), result.gradient, result.information))) break;
+    if (!climb.step(parts_by_slopes(point, weights, result))) break;
     carry();
   }
   result.nuisance = point.nuisance();
@@ -414,16 +429,14 @@ Fit fit(const TransitionModel& model, const std::vector<double>& nuisance, const
   const double start = climb.best();
   const bool finite = std::isfinite(start);
   Reach reach =
-      Reach::one_side;  // It widens where no step rises: at a kink, one side promises a rise that is not there.
+      Reach::one_side;  // It widens where no step rises: one side of a kink promises a rise that is not there.
   result.converged = point.slots().empty() && finite;
   if (!finite) result.reason = "its likelihood is not finite";
   for (int iteration = 0;
        finite && iteration < options.most_iterations + static_cast<int>(reach) && !point.slots().empty(); ++iteration) {
     result.derivatives = iteration == 0 && options.derivatives ? *options.derivatives
                                                                : differences(model, point, result.evaluation, reach);
-    result.information = information(result.derivatives, result.evaluation, weights);
-    result.gradient = penalised_gradient(point.slots(), weights, result);
-    const FreeParts parts = free_parts(point.slots(), result.gradient, result.information);
+    const FreeParts parts = parts_by_slopes(point, weights, result);
     if (parts.all.empty()) {
       result.converged = true;
       break;
@@ -432,17 +445,13 @@ Fit fit(const TransitionModel& model, const std::vector<double>& nuisance, const
       result.reason = stays_below;
       break;
     }
-    // What is promised below this differences do not resolve.
-    const double resolved = unresolved + unresolved_share * (climb.best() - start);
+    const double resolved = unresolved + unresolved_share * (climb.best() - start);  // promise, by differences
     const Stride stride = climb.stride(parts, resolved, reach);
     result.promised = stride.promised;
-    if (options.ends_as_foretold && stride.leaves_nothing()) {
-      result.converged = true;
-      break;
-    }
-    if (stride.better &&
-        climb.best() + 2 * std::abs(stride.risen - stride.foretold) < options.to_beat + worth_beating) {
-      result.reason = stays_below;
+    const bool given_up = climb.gives_up(stride, options.to_beat);
+    if (given_up || (options.ends_as_foretold && stride.leaves_nothing())) {
+      result.converged = !given_up;
+      if (given_up) result.reason = stays_below;
       break;
     }
     if (!stride.better && stride.promised >= resolved && reach != Reach::wide) {

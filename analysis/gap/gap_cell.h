@@ -10,8 +10,8 @@ namespace metastable::analysis {
 /// The facet of cells that hold all events, where stances and collisions are not separate.
 inline constexpr const char* facet_of_all = "all";
 
-/// Says whether a cell holds all stances, all collisions, or all events where these are not separate. A machine's phases
-/// are in words of their own: "phase 2".
+/// Says whether a cell holds all stances, all collisions, or all events where these are not separate. A machine's
+/// phases are in words of their own: "phase 2".
 inline bool holds_all(const std::string& facet, const std::string& at) {
   return facet == facet_of_all || (facet == "phase" && !at.starts_with("phase "));
 }
