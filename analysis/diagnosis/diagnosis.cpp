@@ -152,12 +152,11 @@ std::vector<std::string> notes_on_roughness(const Fitted& fitted, const Diagnosi
         "more, and gains over them (2 Δ ln L) may be {:.2g} too large",
         recalibrated.reason, recalibrated.promised, 2 * recalibrated.promised));
   if (!fitted.ranking.scan.trials_suffice)
-    notes.push_back(
-        fmt::format("{} trial{} of {} {}s on average: what chance does is told by the model alone; from {} trials of a "
-                    "few {}s on, by "
-                    "how trials scatter, which is surer",
-                    data.trials, data.trials == 1 ? "" : "s", data.collisions / std::max<std::size_t>(1, data.trials),
-                    data.step_name, Rules::enough_trials, data.step_name));
+    notes.push_back(fmt::format(
+        "{} trial{} of {} {}s on average: the model alone tells what chance does; from {} trials of a few {}s "
+        "on, it is told by how trials scatter, which is surer",
+        data.trials, data.trials == 1 ? "" : "s", data.collisions / std::max<std::size_t>(1, data.trials),
+        data.step_name, Rules::enough_trials, data.step_name));
   return notes;
 }
 

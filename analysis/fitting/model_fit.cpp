@@ -19,10 +19,9 @@ constexpr double unresolved = 0.5, unresolved_share = 1e-4;
 // Shares of the information's diagonal that are added to it. Where a step rises by less than this share of what it
 // promised, the next one is damped more.
 constexpr double dampings[] = {0, 1e-4, 1e-3, 1e-2, 0.1, 1}, least_kept = 0.25;
-// A step that missed the rise that it foretold by a share of it leaves a rise of the order of that share squared. Where
-// this is below the first number, and it foretold less than the second, next to nothing is left: fits of walkers were
-// left with a fifth to all of the estimate.
-constexpr double next_to_nothing_left = 0.03, moderate_rise = 50;
+// A step that foretold no more than this rise of the log likelihood, and rose by that up to this share, leaves next to
+// nothing: of the order of that share squared. A larger one may have met its promise by chance.
+constexpr double small_rise = 3, least_missed = 0.1;
 // A fit that would have to rise by so much more, and by twice what its last step missed, to come to a likelihood that
 // is known stops below it.
 constexpr double worth_beating = 0.1;
@@ -251,8 +250,7 @@ struct Stride {
   bool better = false;  // or nothing is promised
 
   bool leaves_nothing() const {
-    const double missed = risen - foretold;
-    return better && foretold < moderate_rise && missed * missed < next_to_nothing_left * foretold;
+    return better && foretold < small_rise && std::abs(risen - foretold) < least_missed * foretold;
   }
 };
 
@@ -273,7 +271,7 @@ class Climb {
 
   // Says the same after a step, by what this missed. A likelihood that is above the known one is followed to its top.
   bool gives_up(const Stride& stride, double known) const {
-    return stride.better && best_ <= known &&
+    return stride.better && stride.foretold < small_promise && best_ <= known &&
            best_ + 2 * std::abs(stride.risen - stride.foretold) < known + worth_beating;
   }
 
@@ -428,8 +426,7 @@ Fit fit(const TransitionModel& model, const std::vector<double>& nuisance, const
   Climb climb(point, weights, result);
   const double start = climb.best();
   const bool finite = std::isfinite(start);
-  Reach reach =
-      Reach::one_side;  // It widens where no step rises: one side of a kink promises a rise that is not there.
+  Reach reach = Reach::one_side;  // It widens where no step rises: one side of a kink promises what is not there.
   result.converged = point.slots().empty() && finite;
   if (!finite) result.reason = "its likelihood is not finite";
   for (int iteration = 0;

@@ -430,7 +430,8 @@ void MachineTransitions::set_aside_what_is_misstated(const Fit& recalibrated) {
   if (!(strain > strained_sds)) return;
   const auto loose = with_wide_priors();
   Fit wide = fit(*loose, recalibrated.nuisance, {});
-  // What is stated may be too far off for steps from there to find the way, and a strained fit may lead elsewhere.
+  // The stated values may be too far off for steps from there to find the way; those of a strained fit may lead
+  // elsewhere.
   FitOptions from_stated;
   from_stated.to_beat = wide.penalised;
   if (Fit other = fit(*loose, nominal_values(*loose), {}, from_stated); other.penalised > wide.penalised)
