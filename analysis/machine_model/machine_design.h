@@ -81,7 +81,8 @@ std::vector<std::string> wrapping_columns(const Machine& machine, const MachineR
 /// the error of their sensor. Trials would be taken to begin where that error put them. Empty: there are none.
 std::string unseen_launches(const Machine& machine, const MachineRuns& runs);
 
-/// Asks all of these about the measured values, but that of doubled trials.
+/// Asks all of these about the measured values, but that of doubled trials; and about a number that is there again and
+/// again, off the rows beside it, and rows that repeat the row before, where values are hardly there twice otherwise.
 std::vector<std::string> questions_on_values(const Machine& machine, const MachineRuns& runs);
 
 /// Returns a number for every step.

@@ -445,16 +445,16 @@ void MachineTransitions::set_aside_what_is_misstated(const Fit& recalibrated) {
 void MachineTransitions::ask_for_outcomes(const std::vector<double>& nuisance) {
   if (!plan_.failing || std::ranges::any_of(runs_.trials, [](const MachineTrial& t) { return t.outcome.has_value(); }))
     return;
-  const auto [shortest, longest] = std::ranges::minmax(runs_.trials, {}, [](const auto& t) { return t.rows.size(); });
+  const auto [shortest, longest] =
+      std::ranges::minmax_element(runs_.trials, {}, [](const MachineTrial& t) { return t.rows.size(); });
   double foretold = 0;
-  if (shortest.rows.size() < longest.rows.size())
+  if (shortest->rows.size() < longest->rows.size())
     for (const double chance : rest_chances(fit(*this, nuisance, {}).nuisance, {})) foretold += chance;
   if (foretold < foretold_failures) return;
   notes_.push_back(
       fmt::format("outcome: the model fails in {:.0f} of the steps recorded, trials have {} to {} rows, and no outcome "
-                  "is stated: did "
-                  "those that end early fail (outcome \"failed\")?",
-                  foretold, shortest.rows.size(), longest.rows.size()));
+                  "is stated: did those that end early fail (outcome \"failed\")?",
+                  foretold, shortest->rows.size(), longest->rows.size()));
 }
 
 // Returns, in ascending order, the levels of the measured values of runs drawn from the model: the share of values
