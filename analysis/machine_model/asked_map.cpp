@@ -264,6 +264,10 @@ std::vector<std::string> ask_anew(const Machine& machine, const NominalSteps& fr
   return said;
 }
 
+bool may_be_angle(const std::string& unit) {
+  return unit.empty() || unit.find("rad") != std::string::npos || unit.find("deg") != std::string::npos;
+}
+
 // Puts the measured next values beside those of the nominal map, and what lies between beside its noise, and asks
 // whether one is a unit's factor of the other.
 std::vector<std::string> other_units(const Machine& machine, const NominalSteps& from) {
@@ -281,7 +285,8 @@ std::vector<std::string> other_units(const Machine& machine, const NominalSteps&
     const double size = std::log(std::abs(ratio));
     const char* words = std::isfinite(size) && std::abs(size) > beyond_any_effect ? "another unit" : nullptr;
     for (const UnitFactor& unit : unit_factors)
-      if (std::abs(size - std::log(unit.factor)) < apart) words = unit.words;
+      if ((!unit.of_angles || may_be_angle(machine.unit_of(state))) && std::abs(size - std::log(unit.factor)) < apart)
+        words = unit.words;
     if (words)
       said.push_back(fmt::format("{}: {} {:.3g} times what the machine makes of the rows before: is it in {}?", state,
                                  what, ratio, words));

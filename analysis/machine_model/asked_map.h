@@ -15,14 +15,15 @@ namespace metastable::analysis {
 /// share.
 struct UnitFactor {
   double factor;
+  bool of_angles;
   const char* words;       ///< of what is compared with the machine
   const char* words_here;  ///< of trials that are compared with the others
 };
 inline constexpr UnitFactor unit_factors[]{
-    {180 / std::numbers::pi, "degrees where the machine has radians", "degrees where the others are in radians"},
-    {std::numbers::pi / 180, "radians where the machine has degrees", "radians where the others are in degrees"},
-    {1000, "thousandths of the machine's unit", "thousandths of the others' unit"},
-    {0.001, "thousands of the machine's unit", "thousands of the others' unit"}};
+    {180 / std::numbers::pi, true, "degrees where the machine has radians", "degrees where the others are in radians"},
+    {std::numbers::pi / 180, true, "radians where the machine has degrees", "radians where the others are in degrees"},
+    {1000, false, "thousandths of the machine's unit", "thousandths of the others' unit"},
+    {0.001, false, "thousands of the machine's unit", "thousands of the others' unit"}};
 
 /// The findings about a map that a user is told, sentence by sentence.
 struct MapAsked {

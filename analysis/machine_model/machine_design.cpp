@@ -222,8 +222,8 @@ std::vector<std::string> far_values(const Machine& machine, const MachineRuns& r
       }
     if (count > 0)
       asked.push_back(
-          fmt::format("{}{}: is it a glitch of the sensor? Give NaN there; else it may pass for outliers of "
-                      "a noise",
+          fmt::format("{}{}; it may pass for outliers of a noise, and NaN says that a value is missing: is it a glitch "
+                      "of the sensor?",
                       is, count > 1 ? fmt::format(" (one of {} such rows)", count) : ""));
   }
   return asked;

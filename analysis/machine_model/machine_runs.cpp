@@ -240,7 +240,67 @@ std::vector<std::string> odd_trials(const Machine& machine, const MachineRuns& r
   return said;
 }
 
+using RowColumn = double& (*)(MachineRow&, std::size_t);
+double& sensor_of(MachineRow& row, std::size_t which) { return row.seen[which]; }
+double& input_of(MachineRow& row, std::size_t which) { return row.inputs[which]; }
+
+// Moves a column by one row to later or earlier rows of its trials.
+MachineRuns shifted(const MachineRuns& runs, RowColumn column, std::size_t which, bool later) {
+  MachineRuns moved = runs;
+  for (MachineTrial& trial : moved.trials) {
+    std::vector<MachineRow>& rows = trial.rows;
+    if (later) {
+      for (std::size_t k = rows.size() - 1; k > 0; --k) column(rows[k], which) = column(rows[k - 1], which);
+      rows.erase(rows.begin());
+    } else {
+      for (std::size_t k = 0; k + 1 < rows.size(); ++k) column(rows[k], which) = column(rows[k + 1], which);
+      rows.pop_back();
+      trial.outcome.reset();
+    }
+  }
+  return moved;
+}
+
+MachineRuns turned_round(const MachineRuns& runs, RowColumn column, std::size_t which) {
+  MachineRuns turned = runs;
+  for (MachineTrial& trial : turned.trials)
+    for (MachineRow& row : trial.rows) column(row, which) = -column(row, which);
+  return turned;
+}
+
+MachineRuns backwards(const MachineRuns& runs) {
+  MachineRuns turned = runs;
+  for (MachineTrial& trial : turned.trials) {
+    std::ranges::reverse(trial.rows);
+    trial.outcome.reset();
+  }
+  return turned;
+}
+
 }  // namespace
+
+std::vector<MisreadRuns> misread_runs(const Machine& machine, const MachineRuns& runs) {
+  MachineRuns long_ones = runs;
+  std::erase_if(long_ones.trials, [](const MachineTrial& trial) { return trial.rows.size() < fewest_rows; });
+  std::vector<MisreadRuns> all;
+  const auto add_column = [&](const std::string& name, RowColumn column, std::size_t which) {
+    for (const bool later : {true, false})
+      all.push_back({fmt::format("{}: with its values one row {}", name, later ? "later" : "earlier"),
+                     "is it one row off?", shifted(long_ones, column, which, later)});
+    all.push_back(
+        {name + ": with the other sign", "is its sign the other way round?", turned_round(long_ones, column, which)});
+  };
+  for (std::size_t j = 0; j < machine.observe.size(); ++j) add_column(machine.observe[j].state, sensor_of, j);
+  for (std::size_t i = 0; i < machine.inputs.size(); ++i) add_column(machine.inputs[i], input_of, i);
+  all.push_back(
+      {"runs: with the rows of every trial in the opposite order", "do they run backwards?", backwards(long_ones)});
+  for (MisreadRuns& one : all)
+    std::erase_if(one.runs.trials, [](const MachineTrial& trial) {
+      return std::ranges::any_of(trial.rows.front().seen, [](double x) { return std::isnan(x); });
+    });
+  std::erase_if(all, [](const MisreadRuns& one) { return one.runs.trials.empty(); });
+  return all;
+}
 
 std::size_t steps_of(const MachineTrial& trial) {
   return trial.rows.empty() ? 0 : trial.rows.size() - 1 + (trial.outcome == MachineOutcome::failed ? 1 : 0);

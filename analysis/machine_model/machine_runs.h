@@ -58,6 +58,18 @@ struct ColumnSpread {
 };
 ColumnSpread column_spread(const MachineRuns& runs, std::size_t sensor);
 
+/// The runs as they would be had their user misread a column.
+struct MisreadRuns {
+  std::string change;    ///< what was changed, as the beginning of a sentence
+  std::string question;  ///< to be asked where the machine fits these runs better
+  MachineRuns runs;
+};
+
+/// Returns the runs with each sensor and each input one row later and one row earlier, with its sign the other way
+/// round, and with the rows of every trial in the opposite order. Rows that are left without a value go, and trials do
+/// that have fewer than three rows, or lack a value in the first of them.
+std::vector<MisreadRuns> misread_runs(const Machine& machine, const MachineRuns& runs);
+
 /// Lists in sentences the signs that the runs are not this machine's: columns in other units, in all trials or in some;
 /// a column that is constant in some trials, an input that is in all; trials that are there twice; first rows whose
 /// mean is four standard errors and more off the launch that is stated.

@@ -17,6 +17,10 @@
 namespace metastable::analysis {
 namespace {
 
+constexpr double enough_steps = 30000, enough_failures = 300;
+constexpr double most_experiments = 64;  // whose trials are walked at once
+constexpr std::uint64_t seeds_apart = 0x9E3779B97F4A7C15;
+
 // Draws numbers of one trial by row and purpose.
 class Draws {
  public:
@@ -334,6 +338,34 @@ std::vector<MachineRuns> simulate_machines(const Machine& machine, std::span<con
                                            const MachineHypothesis& supposed, std::span<const std::uint64_t> seeds,
                                            Launches launches) {
   return Walker(machine, experiments, supposed, seeds, launches).walk();
+}
+
+CountedSteps counted_failures(const Machine& machine, const MachineRuns& runs, const MachineHypothesis& supposed,
+                              std::uint64_t seed) {
+  CountedSteps counted;
+  std::uint64_t drawn_so_far = 0;
+  const auto enough = [&] { return counted.steps >= enough_steps || counted.failed >= enough_failures; };
+  while (!enough()) {
+    // The first experiment tells how many there will be. Those are walked together, so that the map is called less
+    // often.
+    const double share = std::max(counted.steps / enough_steps, counted.failed / enough_failures);
+    const auto so_far = static_cast<double>(drawn_so_far);
+    const double more = drawn_so_far == 0 ? 1 : std::clamp(std::ceil(so_far / share) - so_far, 1.0, most_experiments);
+    std::vector<MachineRuns> launched;
+    std::vector<std::uint64_t> seeds;
+    for (std::size_t i = 0; i < static_cast<std::size_t>(more); ++i, ++drawn_so_far) {
+      seeds.push_back(seed + drawn_so_far * seeds_apart);
+      launched.push_back(smoothed_launches(runs, supposed, seeds.back()));
+    }
+    for (const MachineRuns& drawn : simulate_machines(machine, launched, supposed, seeds)) {
+      if (enough()) break;
+      for (const MachineTrial& trial : drawn.trials) {
+        counted.steps += static_cast<double>(steps_of(trial));
+        counted.failed += trial.outcome == MachineOutcome::failed;
+      }
+    }
+  }
+  return counted;
 }
 
 }  // namespace metastable::analysis

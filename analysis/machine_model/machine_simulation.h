@@ -35,4 +35,14 @@ MachineRuns smoothed_launches(const MachineRuns& runs, const MachineHypothesis& 
 /// and columns (reflected_bootstrap()): as far as so many trials leave it open.
 MachineRuns redrawn_launches(const MachineRuns& runs, std::uint64_t seed);
 
+/// Steps that were taken, and those of them that failed.
+struct CountedSteps {
+  double steps = 0, failed = 0;
+};
+
+/// Counts failures in the experiment drawn again and again, with smoothed launches, until 300 came or 30,000 steps were
+/// taken: 6 % of error.
+CountedSteps counted_failures(const Machine& machine, const MachineRuns& runs, const MachineHypothesis& supposed,
+                              std::uint64_t seed);
+
 }  // namespace metastable::analysis

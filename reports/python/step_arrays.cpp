@@ -23,6 +23,11 @@ void take_next(const py::object& returned, std::size_t rows, std::span<double> n
     refuse(fmt::format("the next states are no array of real numbers, but {}",
                        array ? "of dtype " + py::str(array.dtype()).cast<std::string>()
                              : std::string(py::str(py::type::of(returned).attr("__name__")))));
+  if (array.dtype().kind() != 'f')
+    refuse(
+        fmt::format("the next states are whole numbers (dtype {}), which cut off what follows the point: floats are "
+                    "expected",
+                    py::str(array.dtype()).cast<std::string>()));
   const std::size_t dimension = next.size() / rows;
   const bool flat = dimension == 1 && array.ndim() == 1 && static_cast<std::size_t>(array.shape(0)) == rows;
   const bool full = array.ndim() == 2 && static_cast<std::size_t>(array.shape(0)) == rows &&

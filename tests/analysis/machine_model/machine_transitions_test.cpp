@@ -183,6 +183,79 @@ TEST(MachineTransitions, MarksAmongValuesAndRowsThereTwiceAreAskedAbout) {
   EXPECT_EQ(asked(rounded), "");
 }
 
+// A mass on a spring that is pushed by a recorded force, with one of its columns misread.
+class MisreadColumns : public testing::Test {
+ protected:
+  MisreadColumns() {
+    machine_.states = {"x_m", "v_m_s"};
+    machine_.inputs = {"force_N"};
+    machine_.parameters = {{"spring", 0.3, 0.02}, {"push", 0.5, 0.03}, {"scatter", 0.02, 0.01, 1e-3, 1}};
+    machine_.observe = {{"x_m", 0.002, 0}, {"v_m_s", 0.002, 0}};
+    machine_.step = [](const MachineBatch& batch) {
+      for (std::size_t i = 0; i < batch.rows; ++i)
+        after(&batch.states[2 * i], batch.value(0, i), batch.value(1, i) * batch.value(3, i),
+              batch.value(2, i) * batch.scores[i], &batch.next[2 * i]);
+    };
+    std::mt19937_64 generator(4);
+    std::normal_distribution<double> normal;
+    for (int t = 0; t < 30; ++t) {
+      MachineTrial& trial = runs_.trials.emplace_back();
+      double state[]{0.5 * normal(generator), 0.3 * normal(generator)};
+      for (int k = 0; k < 15; ++k) {
+        const double force = std::sin(0.7 * k + t) + 0.3 * normal(generator);
+        trial.rows.push_back(
+            {.seen = {state[0] + 0.002 * normal(generator), state[1] + 0.002 * normal(generator)}, .inputs = {force}});
+        after(state, 0.32, 0.53 * force, 0.02 * normal(generator), state);
+      }
+    }
+  }
+  static void after(const double* state, double spring, double push, double scatter, double* next) {
+    next[1] = 0.95 * state[1] + 0.5 * (push + scatter - spring * state[0]);
+    next[0] = state[0] + 0.5 * next[1];
+  }
+  std::string asked() const {
+    std::string all;
+    const auto model = machine_transitions(std::make_shared<const Machine>(machine_), runs_);
+    for (const std::string& note : model->notes())
+      if (note.ends_with('?')) all += note + "\n";
+    return all;
+  }
+
+  Machine machine_;
+  MachineRuns runs_;
+};
+
+TEST_F(MisreadColumns, RunsAsTheyShouldBeAreNotAskedAbout) { EXPECT_EQ(asked(), ""); }
+
+TEST_F(MisreadColumns, AnInputOneRowLateIsAskedAbout) {
+  for (MachineTrial& trial : runs_.trials) {
+    for (std::size_t k = trial.rows.size() - 1; k > 0; --k) trial.rows[k].inputs = trial.rows[k - 1].inputs;
+    trial.rows.erase(trial.rows.begin());
+  }
+  EXPECT_TRUE(asked().starts_with("force_N: with its values one row earlier the model fits by 1")) << asked();
+  EXPECT_NE(asked().find("nats a value better: is it one row off?"), std::string::npos) << asked();
+}
+
+TEST_F(MisreadColumns, AStateOneRowEarlyIsAskedAbout) {
+  for (MachineTrial& trial : runs_.trials) {
+    for (std::size_t k = 0; k + 1 < trial.rows.size(); ++k) trial.rows[k].seen[1] = trial.rows[k + 1].seen[1];
+    trial.rows.pop_back();
+  }
+  EXPECT_TRUE(asked().starts_with("v_m_s: with its values one row later the model fits by ")) << asked();
+}
+
+TEST_F(MisreadColumns, ASignTheOtherWayRoundIsAskedAbout) {
+  for (MachineTrial& trial : runs_.trials)
+    for (MachineRow& row : trial.rows) row.inputs[0] = -row.inputs[0];
+  EXPECT_TRUE(asked().starts_with("force_N: with the other sign the model fits by ")) << asked();
+}
+
+TEST_F(MisreadColumns, RowsThatRunBackwardsAreAskedAbout) {
+  for (MachineTrial& trial : runs_.trials) std::ranges::reverse(trial.rows);
+  EXPECT_TRUE(asked().starts_with("runs: with the rows of every trial in the opposite order")) << asked();
+  EXPECT_EQ(asked().find("degrees"), std::string::npos) << asked();  // No column is an angle.
+}
+
 // A scatter of b between trials looks like an a near 1, ten of its stated sds off, from which no slope leads back.
 TEST(MachineTransitions, AnEffectIsFoundBehindAParameterThatWouldHideIt) {
   Machine machine = linear_machine(0.02);

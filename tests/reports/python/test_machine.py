@@ -279,6 +279,8 @@ class Refused(unittest.TestCase):
         self.check("step: failed of shape (), ", asked(lambda s, z, p: (s, False)))
         self.check("(next states, failed) is to be returned", asked(lambda s, z, p: s))
         self.check("step: the next states are no array of real numbers, but of dtype complex128", asked(lambda s, z, p: (s + 0j, s[:, 0] > 9)))
+        self.check("step: the next states are whole numbers (dtype int64), which cut off what follows the point",
+                   asked(lambda s, z, p: (s.astype(int), s[:, 0] > 9)))
         self.check("step: whether each state failed is no array of booleans, but of dtype float64", asked(lambda s, z, p: (s, s[:, 0])))
         self.check("step: it makes one number of an array, but states, noise and parameters are arrays of one number a row",
                    asked(lambda s, z, p: (float(p["decay"]) * s, s[:, 0] > 9)))
