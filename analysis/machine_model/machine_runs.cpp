@@ -218,6 +218,15 @@ std::vector<std::string> other_launches(const Machine& machine, const MachineRun
   return said;
 }
 
+// Effects by phase act on steps whose phase is known, and on no others.
+std::vector<std::string> missing_phases(const MachineRuns& runs) {
+  std::size_t missing = 0, steps = 0;
+  for (const MachineTrial& trial : runs.trials)
+    for (std::size_t k = 0; k < steps_of(trial); ++k) ++steps, missing += trial.rows[k].phase < 0;
+  if (missing == 0 || runs.phases.empty()) return {};
+  return {fmt::format("phase: {} of {} steps have none, and effects by phase are not sought in these", missing, steps)};
+}
+
 // Looks at every column trial by trial, without the machine.
 std::vector<std::string> odd_trials(const Machine& machine, const MachineRuns& runs) {
   std::vector<std::string> states, said;
@@ -278,6 +287,14 @@ MachineRuns backwards(const MachineRuns& runs) {
 }
 
 }  // namespace
+
+MachineRuns thinned(const MachineRuns& runs, std::size_t steps) {
+  const std::size_t every = std::max<std::size_t>(1, runs.transitions() / std::max<std::size_t>(1, steps));
+  MachineRuns some = runs;
+  some.trials.clear();
+  for (std::size_t t = 0; t < runs.trials.size(); t += every) some.trials.push_back(runs.trials[t]);
+  return some;
+}
 
 std::vector<MisreadRuns> misread_runs(const Machine& machine, const MachineRuns& runs) {
   MachineRuns long_ones = runs;
@@ -374,8 +391,9 @@ std::vector<std::string> look_over(const Machine& machine, const MachineRuns& ru
   }
   require_launch(machine, runs);
   const MapAsked map = ask_map(machine, runs);
-  for (const std::vector<std::string>& sentences : {map.idle_noise, doubled_trials(runs), map.other_units,
-                                                    odd_trials(machine, runs), other_launches(machine, runs)})
+  for (const std::vector<std::string>& sentences :
+       {map.idle_noise, doubled_trials(runs), map.other_units, odd_trials(machine, runs), other_launches(machine, runs),
+        missing_phases(runs)})
     said.insert(said.end(), sentences.begin(), sentences.end());
   return said;
 }

@@ -58,6 +58,9 @@ struct ColumnSpread {
 };
 ColumnSpread column_spread(const MachineRuns& runs, std::size_t sensor);
 
+/// Returns every n-th trial, so that about `steps` steps are left, or all.
+MachineRuns thinned(const MachineRuns& runs, std::size_t steps);
+
 /// The runs as they would be had their user misread a column.
 struct MisreadRuns {
   std::string change;    ///< what was changed, as the beginning of a sentence
@@ -72,7 +75,7 @@ std::vector<MisreadRuns> misread_runs(const Machine& machine, const MachineRuns&
 
 /// Lists in sentences the signs that the runs are not this machine's: columns in other units, in all trials or in some;
 /// a column that is constant in some trials, an input that is in all; trials that are there twice; first rows whose
-/// mean is four standard errors and more off the launch that is stated.
+/// mean is four standard errors and more off the launch that is stated; steps without a phase.
 /// @throws std::invalid_argument where they do not fit the machine: no transition, fewer rows than parameters, rows of
 ///   another shape, time that runs back within a trial, a label "machine" with two values, a state that is constant, a
 ///   first row that lacks a state without launch; where the map makes something else of the same rows when it is asked

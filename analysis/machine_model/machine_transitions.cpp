@@ -57,6 +57,7 @@ constexpr double foretold_failures = 5;
 // A column is asked about where it fits better in another row or with another sign: by so many nats a value, what a
 // normal error does that becomes smaller by a tenth, and by so many in all, far beyond chance.
 constexpr double misread_nats = 0.1, misread_nats_in_all = 30;
+constexpr std::size_t enough_to_suspect = 500;  // steps in which it is looked for
 
 constexpr double few_failures = 10;  // counted ones, that say next to nothing of the expected steps
 
@@ -449,25 +450,27 @@ double MachineTransitions::mean_log_density(const Evaluation& evaluation) const 
   return count > 0 ? sum / count : -std::numeric_limits<double>::infinity();
 }
 
-// A column that was misread passes for effects, and for parameters that are far off.
+// A column that was misread passes for effects, and for parameters that are far off. A part of the trials shows which
+// change makes them likelier.
 void MachineTransitions::ask_for_misread_columns(const Fit& recalibrated) {
   const double here = mean_log_density(recalibrated.evaluation);
-  const auto values = static_cast<double>(std::ranges::count(events_, EventKind::step, &Event::kind));
-  const MisreadRuns* best = nullptr;
-  double there = -std::numeric_limits<double>::infinity();
+  const std::vector<MisreadRuns> parts = misread_runs(*machine_, thinned(runs_, enough_to_suspect));
+  const std::vector<double> starts[]{nominal_values(*this), recalibrated.nuisance};
+  std::vector<double> there(2 * parts.size());
+  side_by_side(there.size(), 1, [&](std::size_t i) {
+    const auto model = with_runs(parts[i / 2].runs);
+    there[i] = model->mean_log_density(model->evaluate(starts[i % 2], {}));
+  });
+  const auto best = static_cast<std::size_t>(std::ranges::max_element(there) - there.begin());
+  if (there.empty() || !(there[best] > here)) return;
   const std::vector<MisreadRuns> all = misread_runs(*machine_, runs_);
-  const auto take = [&](const MisreadRuns& one, const std::vector<double>& nuisance) {
-    const auto model = with_runs(one.runs);
-    const double mean = model->mean_log_density(model->evaluate(nuisance, {}));
-    if (mean > there) there = mean, best = &one;
-  };
-  for (const MisreadRuns& one : all)
-    for (const std::vector<double>& nuisance : {nominal_values(*this), recalibrated.nuisance}) take(one, nuisance);
-  if (!best) return;
-  take(*best, fit(*with_runs(best->runs), nominal_values(*this), {}).nuisance);
-  if (there - here > std::max(misread_nats, misread_nats_in_all / values))
-    notes_.insert(notes_.begin(), fmt::format("{} the model fits by {:.2g} nats a value better: {}", best->change,
-                                              there - here, best->question));  // It may settle other questions.
+  const MisreadRuns& read = *std::ranges::find(all, parts[best / 2].change, &MisreadRuns::change);
+  const auto model = with_runs(read.runs);
+  const double gain = model->mean_log_density(fit(*model, starts[best % 2], {}).evaluation) - here;
+  const auto values = static_cast<double>(std::ranges::count(events_, EventKind::step, &Event::kind));
+  if (gain > std::max(misread_nats, misread_nats_in_all / values))  // It may settle other questions.
+    notes_.insert(notes_.begin(),
+                  fmt::format("{} the model fits by {:.2g} nats a value better: {}", read.change, gain, read.question));
 }
 
 // Returns, in ascending order, the levels of the measured values of runs drawn from the model: the share of values

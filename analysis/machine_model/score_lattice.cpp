@@ -317,10 +317,10 @@ ScorePlan score_plan(const Machine& machine, const MachineRuns& runs, const Mach
     last_lost = i;
   }
   if (2 * lost > went_on)
-    throw FailsFromMostRows(
-        fmt::format("step: fails without noise from {} of {} rows that went on, as from trial {}, "
-                    "row {}",
-                    lost, went_on, runs.name_of(places[last_lost].trial), places[last_lost].row + 1));
+    throw FailsFromMostRows(fmt::format(
+        "step: without noise the machine fails from {} of {} measured rows after which it went on (trial {}, "
+        "row {} is one): check the units, signs and order of the columns",
+        lost, went_on, runs.name_of(places[last_lost].trial), places[last_lost].row + 1));
   return planned(
       told, static_cast<std::size_t>(std::ranges::count(runs.trials, MachineOutcome::failed, &MachineTrial::outcome)));
 }

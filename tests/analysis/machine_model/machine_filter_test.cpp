@@ -472,8 +472,10 @@ TEST(MachineFilter, AMapThatFailsWhereTheMachineGoesOnIsRefused) {
   };
   const MachineRuns runs =
       scalar_runs(5, 12, 1.0, 0.1, 3, [](double x, double z, std::size_t) { return 0.8 * x + 0.3 + 0.2 * z; });
-  EXPECT_EQ(message_of<FailsFromMostRows>([&] { score_plan(machine, runs, nominal_of(machine)); }),
-            "step: fails without noise from 55 of 55 rows that went on, as from trial 5, row 11");
+  EXPECT_EQ(
+      message_of<FailsFromMostRows>([&] { score_plan(machine, runs, nominal_of(machine)); }),
+      "step: without noise the machine fails from 55 of 55 measured rows after which it went on (trial 5, row 11 is "
+      "one): check the units, signs and order of the columns");
 }
 
 }  // namespace

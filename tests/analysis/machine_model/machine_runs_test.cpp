@@ -222,6 +222,16 @@ TEST_F(LookedOver, AnInputThatIsConstantIsNamed) {
   EXPECT_EQ(said(), "warmth: it is 20 in every row: an input that is constant does not show what it does\n");
 }
 
+// The last row of a trial begins no step.
+TEST_F(LookedOver, PhasesThatAreMissingAreNoted) {
+  runs_.phases = {"left", "right"};
+  for (MachineTrial& trial : runs_.trials)
+    for (std::size_t k = 0; k + 1 < trial.rows.size(); ++k) trial.rows[k].phase = static_cast<int>(k % 2);
+  EXPECT_EQ(said(), "");
+  for (MachineRow& row : runs_.trials[3].rows) row.phase = -1;
+  EXPECT_EQ(said(), "phase: 11 of 220 steps have none, and effects by phase are not sought in these\n");
+}
+
 TEST_F(LookedOver, TimeThatRunsBackIsRefused) {
   for (std::size_t k = 0; k < 12; ++k) runs_.trials[2].rows[k].time = 0.5 * static_cast<double>(k);
   runs_.trials[2].rows[4].time = missing;

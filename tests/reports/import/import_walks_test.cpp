@@ -97,7 +97,8 @@ TEST_F(Import, AsksAboutWalksInOtherUnits) {
   };
   EXPECT_EQ(said(walks_with_angles(1), "rad/s").find("note: "), std::string::npos);
   const std::string full = said(walks_with_angles(2), "rad/s");
-  EXPECT_NE(full.find("note: `diagnose` will refuse these walks: step: fails without noise"), std::string::npos)
+  EXPECT_NE(full.find("note: `diagnose` will refuse these walks: step: without noise the machine fails"),
+            std::string::npos)
       << full;
   EXPECT_NE(full.find("check that angles are in radians, that half_angle_rad is half"), std::string::npos) << full;
   const std::string slow = said(walks_with_angles(1), "deg/s");
