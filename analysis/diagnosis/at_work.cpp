@@ -21,10 +21,12 @@ bool holds(const Cause& cause, const std::string& effect) {
 }
 
 // Averages an effect's parameters over the hypotheses that hold it: their intervals are those of a mixture of normals,
-// each as wide on either side of its middle as its own interval.
+// each as wide on either side of its middle as its own interval. No quantile of a mixture lies beyond all of its
+// parts'.
 std::vector<EstimatedParameter> averaged(const std::vector<Cause>& ranked, const std::string& effect) {
   std::vector<EstimatedParameter> mean;
-  std::vector<double> below, above;  // means of squares
+  std::vector<double> below, above;      // means of squares
+  std::vector<EstimatedParameter> ends;  // the farthest
   double weights = 0;
   for (const Cause& cause : ranked) {
     const auto at = std::ranges::find(cause.effects, effect);
@@ -35,6 +37,7 @@ std::vector<EstimatedParameter> averaged(const std::vector<Cause>& ranked, const
       for (EstimatedParameter& p : mean) p.value = 0;
       below.assign(own.size(), 0);
       above = below;
+      ends = own;
     }
     const auto same_variant = [&] {
       if (own.size() != mean.size()) return false;
@@ -50,6 +53,8 @@ std::vector<EstimatedParameter> averaged(const std::vector<Cause>& ranked, const
       mean[k].value += cause.probability * value;
       below[k] += cause.probability * (down * down + value * value);
       above[k] += cause.probability * (up * up + value * value);
+      ends[k].lower = std::min(ends[k].lower, own[k].lower);
+      ends[k].upper = std::max(ends[k].upper, own[k].upper);
     }
   }
   for (std::size_t k = 0; k < mean.size(); ++k) {
@@ -59,8 +64,8 @@ std::vector<EstimatedParameter> averaged(const std::vector<Cause>& ranked, const
     const auto half = [&](double squares) {
       return normal_90 * std::sqrt(std::max(0.0, squares / weights - p.value * p.value));
     };
-    p.lower = p.value - half(below[k]);
-    p.upper = p.value + half(above[k]);
+    p.lower = std::max(ends[k].lower, p.value - half(below[k]));
+    p.upper = std::min(ends[k].upper, p.value + half(above[k]));
   }
   return mean;
 }

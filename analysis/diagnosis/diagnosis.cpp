@@ -495,9 +495,10 @@ Diagnosis answer(const TransitionModel& model, const Fitted& fitted, Decided dec
     d.limits.next = next_experiments(model, best->fit, rivals(ordered, d), d.rules, options.threads, options.seed);
   progress(1, "done");
   d.limits.at_bound = values_at_bound(model, cause);
+  if (named) d.causes.beside = contact_estimates(model, cause);
   d.sentences = sentences(d);
-  if (d.verdict == Verdict::recalibrate)  // It stands behind the verdict.
-    std::ranges::move(model.misstated(fitted.recalibrated), std::inserter(d.sentences, std::next(d.sentences.begin())));
+  if (named || d.verdict == Verdict::recalibrate)  // It stands behind the verdict.
+    std::ranges::move(model.misstated(cause), std::inserter(d.sentences, std::next(d.sentences.begin())));
   for (const std::string& note : d.data.notes)
     if (note.ends_with('?')) say_question(d, note);
   for (const AtBound& one : d.limits.at_bound) d.sentences.push_back(at_bound_in_words(one, cause.terms));

@@ -178,9 +178,10 @@ struct Diagnosis {
     /// information leaves less than 2 Delta log likelihood 6 between them at the size found. Pairs are alike where they
     /// share one effect and the others are, at what the first's gains beside it. Empty where there is none.
     std::vector<std::string> alike;
-    std::vector<StepwiseChoice> stepwise;  ///< what the field's usual selection names, for comparison
-    std::string size;                      ///< TransitionModel::size_in_words() of the likeliest
-    std::string even_push;                 ///< a sentence that says that a push, or one by a facet, fits as well; or ""
+    std::vector<StepwiseChoice> stepwise;    ///< what the field's usual selection names, for comparison
+    std::vector<EstimatedParameter> beside;  ///< what a recalibration refits, beside the effects that are named
+    std::string size;                        ///< TransitionModel::size_in_words() of the likeliest
+    std::string even_push;  ///< a sentence that says that a push, or one by a facet, fits as well; or ""
     /// These are probabilities. A gap has at least even odds where the tests find one, else at most even ones.
     double p_no_gap = 0, p_recalibrate = 0, p_none = 0;
     double together = 1;          ///< of the best hypothesis, if of several effects: see Rules::most_together

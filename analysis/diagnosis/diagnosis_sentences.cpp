@@ -428,9 +428,11 @@ std::string next_step(const Diagnosis& d) {
     case Verdict::explained:
       if (d.causes.set.size() == 1)
         return fmt::format(
-            "Give the model {} with the parameters under “Which effect”, or take it out of {}; "
+            "Give the model {} with the parameters under “Which effect”{}, or take it out of {}; "
             "new trials should then leave no gap.",
-            d.causes.set.front(), taken_out_of(effects_of_cause(d.causes.set.front())));
+            d.causes.set.front(),
+            d.causes.beside.empty() ? "" : " and its own ones as they are beside it (“Recalibrated parameters”)",
+            taken_out_of(effects_of_cause(d.causes.set.front())));
       if (!d.limits.next.empty())
         return fmt::format(
             "Tell the causes apart before changing the model: {} would do it best{} (“The next experiment”).",

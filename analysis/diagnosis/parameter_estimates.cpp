@@ -79,8 +79,8 @@ std::pair<double, double> effect_ends(const TransitionModel& model, const Ranked
   const bool there = ranked.terms.size() == 1 && ranked.gain > surely_there && std::abs(value - p.neutral) < half;
   const bool alone_below = p.neutral <= p.lower || (there && p.neutral < value),
              alone_above = p.neutral >= p.upper || (there && p.neutral > value);
-  return {std::min(alone_below ? low : std::min(low, value - half), value - p.blur),
-          std::max(alone_above ? high : std::max(high, value + half), value + p.blur)};
+  return {std::max(p.lower, std::min(alone_below ? low : std::min(low, value - half), value - p.blur)),
+          std::min(p.upper, std::max(alone_above ? high : std::max(high, value + half), value + p.blur))};
 }
 
 // Holds what one of an effect's variants says of its numbers.
@@ -196,9 +196,9 @@ std::vector<EstimatedParameter> contact_estimates(const TransitionModel& model, 
     return model.report_nuisances(moved)[number].second;
   };
   for (std::size_t k = 0; k < here.size(); ++k) {
-    Eigen::VectorXd slope(covariance.rows());
-    for (Eigen::Index p = 0; p < slope.size(); ++p) {
-      const auto slot = static_cast<std::size_t>(p);
+    Eigen::VectorXd slope = Eigen::VectorXd::Zero(covariance.rows());  // none by sizes of effects
+    for (std::size_t slot = 0; slot < fit.nuisance.size(); ++slot) {
+      const auto p = static_cast<Eigen::Index>(slot);
       const double step = model.nuisances()[slot].step;
       slope[p] = (with(p, fit.nuisance[slot] + step, k) - here[k].second) / step;
     }

@@ -20,9 +20,9 @@ struct RankedCause;
 ///                follows the likelihood towards none. If false, it follows the curvature, which costs nothing.
 Cause described_cause(const TransitionModel& model, const RankedCause& ranked, const EffectScan& scan, bool likely);
 
-/// Returns the recalibrated contact. Intervals hold chance and Nuisance::form_sd. Those of numbers that one nuisance
-/// alone moves reach as far as the likelihood does (likelihood_ends()) or its curvature, the others follow the slopes
-/// of the reported numbers.
+/// Returns what a recalibration refits, as this fit has it. Intervals hold chance and Nuisance::form_sd. Those of
+/// numbers that one nuisance alone moves reach as far as the likelihood does (likelihood_ends()) or its curvature, the
+/// others follow the slopes of the reported numbers.
 std::vector<EstimatedParameter> contact_estimates(const TransitionModel& model, const Fit& fit);
 
 }  // namespace metastable::analysis

@@ -201,6 +201,8 @@ Fit fit_one_more(const TransitionModel& model, const Effort& effort, const Fit& 
     };
     if (tried.penalised < base.penalised)  // a bad start: from nothing instead
       try_from([](const FreeParameter& p) { return p.try_at != 0 ? p.try_at * small_start : p.neutral; });
+    if (tried.penalised < base.penalised)  // At no size it is the base.
+      try_from([](const FreeParameter& p) { return p.neutral; });
     if (scanned.candidate->parameters.size() == 1 && scanned.candidate->parameters[0].likely != 0)
       try_from([](const FreeParameter& p) { return p.likely; });
     if (first || tried.penalised > best.penalised) best = std::move(tried);

@@ -288,8 +288,8 @@ RankedCause with_one_more(const RankingProblem& problem, const SingleEffects& si
   RankedCause set = as_cause(fit_one_more(problem.model, problem.effort, base.fit, more), problem.recalibrated);
   if (!std::isfinite(set.evidence)) return set;
   const double last = measure_last(problem, singles, base, set);
-  set.evidence =
-      base.evidence + evidence_of(more, last, problem.rules) + log_prior_of_one_more(problem, base.terms.size() + 1);
+  set.evidence = base.evidence + evidence_of(more, last, problem.rules) + std::min(0.0, 0.5 * (set.gain - base.gain)) +
+                 log_prior_of_one_more(problem, base.terms.size() + 1);
   return set;
 }
 
@@ -353,7 +353,9 @@ void bound_by_parts(const RankingProblem& problem, const SingleEffects& singles,
       const double beyond = set.gain - part->gain;
       if (beyond <= hardly_more) {
         const auto parameters = static_cast<double>(last.candidate->parameters.size());
-        least = std::min(least, part->evidence + evidence_of_gain(std::max(0.0, beyond), parameters, problem.rules));
+        // A fit that ended below the part's has lost what it gains less.
+        least = std::min(least, part->evidence + std::min(0.0, 0.5 * beyond) +
+                                    evidence_of_gain(std::max(0.0, beyond), parameters, problem.rules));
       } else if (!last.candidate->exact) {
         // An exact effect is not the last one: the others, beside it, have no error of form to be forgiven.
         whole.push_back(&*part), lacks.push_back(last.candidate), evidence.push_back(part->evidence);

@@ -268,9 +268,9 @@ class TransitionModel {
   /// Holds what the recalibrated model draws against the densities that it gives. The default does nothing.
   /// @throws std::runtime_error  where the two differ by so much that effects would be named which are not there
   virtual void require_own_draws(const Fit& recalibrated) const;
-  /// Says where a recalibration that suits the data leaves a number far from where it is stated, and what would do
-  /// instead: sentences. The default has none.
-  virtual std::vector<std::string> misstated(const Fit& recalibrated) const;
+  /// Says where a fit that suits the data leaves a number far from where it is stated, and, for a fit without effects,
+  /// what would do instead: sentences. The default has none.
+  virtual std::vector<std::string> misstated(const Fit& fitted) const;
   /// Says what is not known or was assumed, a sentence each.
   virtual const std::vector<std::string>& notes() const = 0;
   /// Says what was wrong with the data or the nominal model and taken all the same; "" if nothing was.

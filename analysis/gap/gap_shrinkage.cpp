@@ -22,11 +22,12 @@
 namespace metastable::analysis {
 namespace {
 
-constexpr double cell_shift_sd = 0.15;   // prior of a cell's shift, in scores
-constexpr double parameter_price = 1.5;  // log likelihood that a rival pays for a parameter of its effects
-constexpr int interval_draws = 400;      // of the bootstrap over trials
-constexpr double bounded_score = 6;      // scores further out count as this one to the flexible model
-constexpr double farthest_score = 12;    // and as this one to the CRPS
+constexpr double cell_shift_sd = 0.15;           // prior of a cell's shift, in scores
+constexpr double parameter_price = 1.5;          // log likelihood that a rival pays for a parameter of its effects
+constexpr int interval_draws = 400;              // of the bootstrap over trials
+constexpr double bounded_score = 6;              // scores further out count as this one to the flexible model
+constexpr double farthest_score = 12;            // and as this one to the CRPS
+constexpr double far_out = 1.5, most_units = 3;  // for units_tell(): of the scores' median; of the likeliest model's
 
 // Holds what one trial, held out, says.
 struct HeldOut {
@@ -40,6 +41,22 @@ struct HeldOut {
 
 double crps(double z) {
   return z * (2 * dynamics::normal_cdf(z) - 1) + 2 * dynamics::normal_density(z) - std::numbers::inv_sqrtpi;
+}
+
+// Says whether units tell how widely this model foretells values. Where most values lie in its tails, which wild rows
+// make long, units are those of the tails: there they must not exceed three times those of the likeliest model, which
+// has none that lie so.
+bool units_tell(const TransitionModel& model, const Evaluation& e, const Evaluation& likeliest) {
+  std::vector<double> scores, units, usual;
+  for (std::size_t i = 0; i < e.unit.size(); ++i) {
+    const EventKind kind = model.events()[i].kind;
+    if (kind != EventKind::collision && kind != EventKind::step && kind != EventKind::stance) continue;
+    scores.push_back(std::abs(e.score[i]));
+    units.push_back(e.unit[i]);
+    usual.push_back(likeliest.unit[i]);
+  }
+  return scores.empty() || median(std::move(scores)) < far_out ||
+         (&e != &likeliest && median(std::move(units)) < most_units * median(std::move(usual)));
 }
 
 // Returns [rad/s of a score] by kind of event.
@@ -248,6 +265,9 @@ HeldOutGap gap_shrinkage(const TransitionModel& model, const Fit& given, const F
   HeldOutGap result;
   for (const HeldOut& h : held) result.left.push_back(h.flexible - h.flexible_floor);
   result.measures = held_out_measures(model, held, seed);
+  const Evaluation& likeliest = (rivals.empty() ? recalibrated : *rivals.front()).evaluation;
+  for (const Evaluation* one : {&likeliest, &recalibrated.evaluation, &given.evaluation})
+    if (!units_tell(model, *one, likeliest)) result.measures.resize(1);
   return result;
 }
 

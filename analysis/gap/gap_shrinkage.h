@@ -60,8 +60,9 @@ struct HeldOutGap {
 /// with the best penalised likelihood there, less a price of its parameters without a prior, is used on the held-out
 /// ones (an empty list of terms: none). Measures:
 /// log score per collision below that of a flexible model (the chosen one plus a ridge-fitted shift in every cell of
-/// the gap map, cross-fitted), and CRPS of the next speed. The floor is the same measure on data of the chosen model
-/// itself. Intervals are 90 % over trials, by a bootstrap of 400 draws; that of the share closed ends at 1.
+/// the gap map, cross-fitted), and CRPS of the next speed where one column is observed and no model has most values in
+/// its tails. The floor is the same measure on data of the chosen model itself. Intervals are 90 % over trials, by a
+/// bootstrap of 400 draws; that of the share closed ends at 1.
 /// @param given  its evaluation is that of the model as given
 /// @param rivals  fits of the same model; none: the recalibrated model stands for the chosen one
 /// @param folds  >= 2 @throws std::invalid_argument for fewer

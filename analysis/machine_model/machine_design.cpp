@@ -39,6 +39,7 @@ constexpr std::size_t fewest_first = 5;  // So many first values tell a spread.
 // is there once.
 constexpr std::size_t fewest_marks = 5;
 constexpr double mark_share = 0.02, mark_steps = 3, repeated_share = 0.2, nearly_all = 0.9;
+constexpr double least_spike = 0.1;  // of a column's span: a value of a sensor that rounds, off the rows beside it
 
 // Fills in means and spreads of the columns.
 void measure_columns(MachineDesign& design, const Machine& machine, const MachineRuns& runs) {
@@ -132,8 +133,8 @@ void measure_inputs(MachineDesign& design, const Machine& machine, const Machine
       course.by_phase = course.by_phase && of_phase.try_emplace(at.phase, here).first->second == here;
       course.changes = course.changes || here != rows.front().inputs[i];
     }
-    course.code =
-        values.size() <= most_codes && std::ranges::all_of(values, [](double x) { return x == std::floor(x); });
+    course.code = machine.unit_of(machine.inputs[i]).empty() && values.size() <= most_codes &&
+                  std::ranges::all_of(values, [](double x) { return x == std::floor(x); });
     const double count = std::max<double>(1, static_cast<double>(all.size()));
     const double mean = std::accumulate(all.begin(), all.end(), 0.0) / count;
     double squares = 0;
@@ -353,20 +354,47 @@ double usual_step(const MachineRuns& runs, std::size_t sensor, double mark, bool
   return steps.empty() ? 0 : median(std::move(steps));
 }
 
-// A mark for a missing value is the same number again and again, off the rows beside it, among values that all differ.
+// Counts the rows that hold this value between two others: `all`, and those of them that lie off both to one side, by
+// some usual steps and a share of the column's span.
+struct Spikes {
+  std::size_t all = 0, off = 0;
+};
+Spikes spikes_at(const MachineRuns& runs, std::size_t sensor, double mark) {
+  const auto [low, high] = usual_range(runs, sensor);
+  const double reach = std::max(mark_steps * usual_step(runs, sensor, mark, false), least_spike * (high - low));
+  Spikes spikes;
+  for (const MachineTrial& trial : runs.trials)
+    for (std::size_t k = 1; k + 1 < trial.rows.size(); ++k) {
+      const double before = trial.rows[k - 1].seen[sensor], after = trial.rows[k + 1].seen[sensor];
+      if (trial.rows[k].seen[sensor] != mark || !(before != mark && after != mark)) continue;
+      ++spikes.all;
+      spikes.off += std::min(before, after) - mark > reach || mark - std::max(before, after) > reach;
+    }
+  return spikes;
+}
+
+// A mark for a missing value is the same number again and again, off the rows beside it: any number among values that
+// all differ, and 0 or -1 among those of a sensor that rounds.
 std::vector<std::string> marks_among_values(const Machine& machine, const MachineRuns& runs) {
   std::vector<std::string> asked;
   for (std::size_t j = 0; j < machine.observe.size(); ++j) {
     const ValueCounts counted = counted_values(runs, j);
-    const auto [mark, times] = counted.most;
-    if (times < fewest_marks || static_cast<double>(times) < mark_share * static_cast<double>(counted.values) ||
-        !counted.others_differ(times) ||
-        !(usual_step(runs, j, mark, true) > mark_steps * usual_step(runs, j, mark, false)))
-      continue;
-    asked.push_back(
-        fmt::format("{}: it is {:g} in {} rows, off the rows beside them, where other values are hardly there "
-                    "twice; NaN says that a value is missing: is it a mark for that?",
-                    machine.observe[j].state, mark, times));
+    for (const double mark : std::set{counted.most.first, 0.0, -1.0}) {
+      const auto found = counted.times.find(mark);
+      const std::size_t times = found == counted.times.end() ? 0 : found->second;
+      if (times < fewest_marks || static_cast<double>(times) < mark_share * static_cast<double>(counted.values))
+        continue;
+      const bool among_others = counted.others_differ(times) &&
+                                usual_step(runs, j, mark, true) > mark_steps * usual_step(runs, j, mark, false);
+      const Spikes spikes = spikes_at(runs, j, mark);
+      const bool off = (mark == 0 || mark == -1) && spikes.off >= fewest_marks &&
+                       static_cast<double>(spikes.off) > nearly_all * static_cast<double>(spikes.all);
+      if (among_others || off)
+        asked.push_back(fmt::format(
+            "{}: it is {:g} in {} rows, off the rows beside them{}; NaN says that a value is missing: is it a mark for "
+            "that?",
+            machine.observe[j].state, mark, times, off ? "" : ", where other values are hardly there twice"));
+    }
   }
   return asked;
 }

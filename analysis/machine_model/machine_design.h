@@ -27,7 +27,7 @@ struct StepPlace {
 
 /// Says how an input goes along.
 struct InputCourse {
-  bool code = false;     ///< it takes few values, all whole: there is nothing between them
+  bool code = false;     ///< it has no unit, and takes few values, all whole: there is nothing between them
   bool by_phase = true;  ///< it is the same wherever the phase is
   bool changes = false;  ///< it changes within a trial
 };
@@ -82,7 +82,8 @@ std::vector<std::string> wrapping_columns(const Machine& machine, const MachineR
 std::string unseen_launches(const Machine& machine, const MachineRuns& runs);
 
 /// Asks all of these about the measured values, but that of doubled trials; and about a number that is there again and
-/// again, off the rows beside it, and rows that repeat the row before, where values are hardly there twice otherwise.
+/// again, off the rows beside it (0 and -1 of a sensor that rounds, too), and rows that repeat the row before, where
+/// values are hardly there twice otherwise.
 std::vector<std::string> questions_on_values(const Machine& machine, const MachineRuns& runs);
 
 /// Returns a number for every step.

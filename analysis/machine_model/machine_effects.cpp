@@ -289,7 +289,7 @@ MachineCandidate lag(const Machine& machine, const MachineDesign& design, std::s
   else if (design.inputs[input].code)
     one.candidate.undecidable = machine.inputs[input] +
                                 " has few values, all whole, and is taken for a code (a gear, a leg), which has no "
-                                "values in between; given in another unit, as a hundredth, it is none";
+                                "values in between; one that has a unit, by the end of its name or stated, is none";
   one.apply = [input, inputs = machine.inputs.size()](MachineHypothesis& h, const Values&, const Values& v) {
     h.lag.resize(inputs);
     h.lag[input] = v[0];

@@ -183,11 +183,12 @@ class MachineTransitions : public TransitionModel {
                         std::uint64_t seed) const override;
   const std::vector<std::string>& notes() const override { return notes_; }
   std::vector<NamedValue> report_nuisances(std::span<const double> nuisance) const override;
-  std::vector<std::string> misstated(const Fit& recalibrated) const override;
+  std::vector<std::string> misstated(const Fit& fitted) const override;
   void require_own_draws(const Fit& recalibrated) const override;
 
   std::unique_ptr<MachineTransitions> with_wide_priors() const;
-  bool effect_speaks_for_what_is_stated(const Fit& recalibrated, const Fit& wide) const;
+  bool effect_speaks_for_what_is_stated(const std::vector<std::size_t>& slots, const Fit& recalibrated,
+                                        const Fit& wide) const;
   void set_aside_what_is_misstated(const Fit& recalibrated);
   void ask_for_outcomes(const std::vector<double>& nuisance);  // near which the recalibration lies
   void ask_for_misread_columns(const Fit& recalibrated);
@@ -388,9 +389,10 @@ std::unique_ptr<MachineTransitions> MachineTransitions::with_wide_priors() const
   return copy;
 }
 
-// Says whether one of the effects that promise most makes the runs likelier, with all parameters held to what is stated
-// of them, than a recalibration does that leaves some of them behind; of several variants one does by chance.
-bool MachineTransitions::effect_speaks_for_what_is_stated(const Fit& recalibrated, const Fit& wide) const {
+// Says whether one of the effects that promise most makes the runs likelier, with the parameters of these slots near
+// what is stated of them, than a recalibration does that leaves them behind; of several variants one does by chance.
+bool MachineTransitions::effect_speaks_for_what_is_stated(const std::vector<std::size_t>& slots,
+                                                          const Fit& recalibrated, const Fit& wide) const {
   std::vector<const Candidate*> all;
   for (const Candidate& one : candidates_) all.push_back(&one);
   const EffectScan scan = scan_effects(*this, recalibrated, all, 1);
@@ -402,7 +404,9 @@ bool MachineTransitions::effect_speaks_for_what_is_stated(const Fit& recalibrate
     const ScannedEffect& effect = scan.effects[i];
     const Fit with = fit(*this, recalibrated.nuisance, {term_at(effect, effect.best)});
     const double variants = static_cast<double>(effect.candidate->variants.size());
-    return 2 * (with.log_likelihood - wide.log_likelihood - std::log(variants)) > Rules{}.told_apart;
+    return 2 * (with.log_likelihood - wide.log_likelihood - std::log(variants)) > Rules{}.told_apart &&
+           std::ranges::all_of(
+               slots, [&](std::size_t slot) { return sds_off(nuisances_[slot], with.nuisance[slot]) < misstated_sds; });
   });
 }
 
@@ -423,7 +427,7 @@ void MachineTransitions::set_aside_what_is_misstated(const Fit& recalibrated) {
   if (Fit other = fit(*loose, nominal_values(*loose), {}, from_stated); other.penalised > wide.penalised)
     wide = std::move(other);
   const std::vector<std::size_t> slots = misstated_slots(*loose, wide.nuisance);
-  if (slots.empty() || effect_speaks_for_what_is_stated(recalibrated, wide)) return;
+  if (slots.empty() || effect_speaks_for_what_is_stated(slots, recalibrated, wide)) return;
   for (const std::size_t one : slots) nuisances_[one].misstated = 1;
 }
 
@@ -540,23 +544,28 @@ bool MachineTransitions::only_wild_rows(const Fit& recalibrated) const {
   return others == 0 || gain < others + chance_sds * std::sqrt(2 * others);
 }
 
-std::vector<std::string> MachineTransitions::misstated(const Fit& recalibrated) const {
-  const std::vector<std::size_t> slots = misstated_slots(*this, recalibrated.nuisance);
-  if (slots.empty() && only_wild_rows(recalibrated))
+std::vector<std::string> MachineTransitions::misstated(const Fit& fitted) const {
+  const std::vector<std::size_t> slots = misstated_slots(*this, fitted.nuisance);
+  if (fitted.terms.empty() && slots.empty() && only_wild_rows(fitted))
     return {fmt::format(
         "Nothing but the share of wild rows, {:.2g}, differs from the model as given by more than chance may make it.",
-        share_of(recalibrated.nuisance.back()))};
+        share_of(fitted.nuisance.back()))};
   if (slots.empty()) return {};
-  const Eigen::MatrixXd root = resolved_root(recalibrated.information);
+  const Eigen::MatrixXd root = resolved_root(fitted.information);
   std::vector<std::string> far;
   for (const std::size_t slot : slots) {
     const Nuisance& stated = nuisances_[slot];
-    const double value = recalibrated.nuisance[slot];
+    const double value = fitted.nuisance[slot];
     const double half = normal_90 * root.row(static_cast<Eigen::Index>(slot)).norm();
-    far.push_back(fmt::format("{} is {:.4g} (90 %: {:.4g} to {:.4g}), {:.2g} of its stated sds from {:.4g}",
-                              stated.name, value, value - half, value + half, sds_off(stated, value), stated.nominal));
+    far.push_back(fmt::format("{} is {:.4g} (90 %: {:.4g} to {:.4g}), {:.2g} of its stated sds from {:.4g}{}",
+                              stated.name, value, value - half, value + half, sds_off(stated, value), stated.nominal,
+                              value * stated.nominal < 0 ? ", with the other sign" : ""));
   }
-  const std::vector<std::string> other = effects_instead(recalibrated);
+  if (!fitted.terms.empty())
+    return {
+        fmt::format("With what is named, {}: known less well than stated, unless a unit, a sign or a clock is wrong.",
+                    fmt::join(far, "; "))};
+  const std::vector<std::string> other = effects_instead(fitted);
   return {fmt::format("{}: known less well than stated{}.", fmt::join(far, "; "),
                       other.empty()
                           ? ""

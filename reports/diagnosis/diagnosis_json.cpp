@@ -281,6 +281,8 @@ std::string diagnosis_json(const analysis::Diagnosis& d, const Provenance& prove
   });
   const NamedParameters contact = named_parameters("contact_distribution", d.gap.contact);
   json["contact"] = {{"parameters", contact.values}, {"interval_90", contact.intervals}};
+  const NamedParameters beside = named_parameters("contact_distribution", d.causes.beside);
+  json["contact_beside_effects"] = {{"parameters", beside.values}, {"interval_90", beside.intervals}};
   json["shrinkage"] = shrinkage_json(d.shrinkage.measures.empty() ? unknown_shrinkage() : d.shrinkage.measures.front());
   json["shrinkage_by_measure"] = list_json(d.shrinkage.measures, shrinkage_json);
   json["steps_before_failure"] = steps_json(d.shrinkage.steps);

@@ -115,6 +115,9 @@ Table contact_table(const Diagnosis& d) {
               .title = "Recalibrated parameters",
               .columns = {{"parameter"}, {.name = "value (90 %)", .level = 90}}};
   for (const EstimatedParameter& p : d.gap.contact) table.rows.push_back({p.name, with_interval(p)});
+  if (d.causes.beside.empty()) return table;
+  table.columns.push_back({.name = "beside " + d.causes.ranked.front().name() + " (90 %)", .level = 90});
+  for (std::size_t k = 0; k < table.rows.size(); ++k) table.rows[k].push_back(with_interval(d.causes.beside[k]));
   return table;
 }
 

@@ -194,6 +194,26 @@ TEST(EffectSets, AreWorthWhatTheyEarnBeyondTheBestPart) {
   }
 }
 
+// A fit of three effects that ended 100 below that of two of them does not inherit what these are worth, or a longer
+// fit of it would be worth more than it gains.
+TEST(EffectSets, AFitThatEndedBelowItsPartIsWorthLess) {
+  const Waves model(line(0, 1, 2400), 2);
+  const CauseRanking ranking = ranked(model);
+  const auto part = std::ranges::max_element(ranking.pairs, {}, &RankedCause::evidence);
+  ASSERT_NE(part, ranking.pairs.end());
+  std::vector<const Candidate*> candidates;
+  for (const Candidate& candidate : model.candidates()) candidates.push_back(&candidate);
+  const Fit recalibrated = fit(model, {0, 0}, {});
+  const Rules rules;
+  const RankingProblem problem{model, recalibrated, candidates, rules, 1, {}, [] {}};
+  const SingleEffects singles{ranking.scan, ChanceGains(ranking.scan, 10, 1), ranking.singles, {}};
+  std::vector<RankedCause> sets{*part};
+  sets[0].terms.push_back(ranking.singles[5].terms[0]);
+  sets[0].gain -= 100;
+  bound_by_parts(problem, singles, ranking.pairs, sets);
+  EXPECT_LT(sets[0].evidence, part->evidence - 50);
+}
+
 // One more effect is as likely as the rule says, whichever of the others it is.
 TEST(EffectSets, TheOddsOfOneMoreAreSharedByTheOthers) {
   const Waves model(line(0, 1, 40), 0);

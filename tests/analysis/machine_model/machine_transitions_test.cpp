@@ -181,6 +181,10 @@ TEST(MachineTransitions, MarksAmongValuesAndRowsThereTwiceAreAskedAbout) {
   for (MachineTrial& trial : rounded.trials)  // A sensor that rounds repeats itself, too.
     for (MachineRow& row : trial.rows) row.seen = {std::round(row.seen[0] * 10) / 10};
   EXPECT_EQ(asked(rounded), "");
+  for (MachineTrial& trial : rounded.trials)
+    for (std::size_t k = 3; k < trial.rows.size(); k += 7) trial.rows[k].seen = {-1};
+  EXPECT_TRUE(asked(rounded).starts_with("swing_rad: it is -1 in 120 rows, off the rows beside them; NaN says"))
+      << asked(rounded);
 }
 
 // A mass on a spring that is pushed by a recorded force, with one of its columns misread.
@@ -331,6 +335,54 @@ TEST(MachineTransitions, AThresholdThatIsOffIsFound) {
   const Diagnosis d = diagnose(*model, {.catalogue = {"friction"}, .draws = 400});
   ASSERT_EQ(d.causes.set, std::vector<std::string>{"friction"}) << said(d);
   EXPECT_NEAR(d.causes.ranked.front().parameters[0][0].value, 0.15, 0.03) << said(d);
+}
+
+// Where the model as given has nearly all values in the tails that wild rows make, a score there is worth far more than
+// in its middle, and the mean distance from it came out 48 times too large.
+TEST(MachineTransitions, TailsTellNoDistance) {
+  Machine machine = linear_machine(0.05);
+  machine.most_wild = 0.01;
+  const auto told = [&](double by) {
+    const auto next = [&](double x, double z, std::size_t) { return 0.8 * x + 0.3 + by + 0.2 * z; };
+    return std::ranges::any_of(diagnosed(machine, scalar_runs(60, 12, 1.5, 0.05, 17, next)).shrinkage.measures,
+                               [](const Shrinkage& one) { return one.measure.find("CRPS") != std::string::npos; });
+  };
+  EXPECT_TRUE(told(0.2));
+  EXPECT_FALSE(told(1.5));
+}
+
+// A sensor with the other sign makes the gain that drives it negative; a scatter of that gain gained as well, beside
+// the negative one.
+TEST(MachineTransitions, AParameterWithTheOtherSignIsToldBesideAnEffect) {
+  Machine machine;
+  machine.states = {"x"};
+  machine.inputs = {"drive"};
+  machine.parameters = {{"gain", 1, 0.1}, {"scatter", 0.1, 0.05, 0.01, 1}};
+  machine.effects = {{"bend", {{"bend", 0, -2, 2}}}};
+  machine.may_vary = {"gain"};
+  machine.observe = {{"x", 0.02, 0}};
+  machine.step = [](const MachineBatch& b) {
+    for (std::size_t i = 0; i < b.rows; ++i) {
+      const double x = b.states[i], drive = b.value(3, i);
+      b.next[i] = 0.7 * x + b.value(0, i) * drive + b.value(2, i) * drive * drive + b.value(1, i) * b.scores[i];
+    }
+  };
+  std::size_t row = 0;
+  MachineRuns runs = scalar_runs(30, 12, 0, 0.02, 3, [&](double x, double z, std::size_t) {
+    const double drive = std::sin(0.9 * static_cast<double>(row++));
+    return 0.7 * x - drive + 0.4 * drive * drive + 0.1 * z;
+  });
+  row = 0;
+  for (MachineTrial& trial : runs.trials)
+    for (std::size_t k = 0; k < trial.rows.size(); ++k)
+      trial.rows[k].inputs = {std::sin(0.9 * static_cast<double>(k + 1 < trial.rows.size() ? row++ : row))};
+  const Diagnosis d = diagnosed(machine, std::move(runs));
+  ASSERT_EQ(d.verdict, Verdict::explained) << said(d);
+  EXPECT_EQ(d.causes.set, std::vector<std::string>{"bend"}) << said(d);
+  ASSERT_EQ(d.causes.beside.size(), d.gap.contact.size());
+  EXPECT_NEAR(d.causes.beside[0].value, -1, 0.1);
+  EXPECT_TRUE(d.sentences.at(1).starts_with("With what is named, gain is -")) << said(d);
+  EXPECT_NE(d.sentences.at(1).find("of its stated sds from 1, with the other sign"), std::string::npos) << said(d);
 }
 
 // The record holds some ten and thirty periods of the sine. A list of few frequencies at equal ratios has none near
