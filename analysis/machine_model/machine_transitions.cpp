@@ -48,7 +48,8 @@ constexpr double misstated_share = 0.01;
 // chance reaches in 0.3 %. The effects that promise most, so many, may speak for the stated value.
 constexpr double strained_sds = 2, misstated_sds = 3;
 constexpr std::size_t most_instead = 3;
-constexpr double chance_sds = 2;  // So far from its mean chance takes what n numbers gain: n, with a variance of 2 n.
+constexpr double far_behind = 12;  // log likelihood below, with priors, that one more effect may still make up for
+constexpr double chance_sds = 2;   // So far from its mean chance takes what n numbers gain: n, with a variance of 2 n.
 
 // Failures that the model foretells in the steps recorded, from which trials that end early are asked about: none of so
 // many comes by chance in one data set of 150.
@@ -187,8 +188,7 @@ class MachineTransitions : public TransitionModel {
   void require_own_draws(const Fit& recalibrated) const override;
 
   std::unique_ptr<MachineTransitions> with_wide_priors() const;
-  bool effect_speaks_for_what_is_stated(const std::vector<std::size_t>& slots, const Fit& recalibrated,
-                                        const Fit& wide) const;
+  bool effect_speaks_for_what_is_stated(const Fit& recalibrated, const Fit& wide) const;
   void set_aside_what_is_misstated(const Fit& recalibrated);
   void ask_for_outcomes(const std::vector<double>& nuisance);  // near which the recalibration lies
   void ask_for_misread_columns(const Fit& recalibrated);
@@ -389,10 +389,10 @@ std::unique_ptr<MachineTransitions> MachineTransitions::with_wide_priors() const
   return copy;
 }
 
-// Says whether one of the effects that promise most makes the runs likelier, with the parameters of these slots near
-// what is stated of them, than a recalibration does that leaves them behind; of several variants one does by chance.
-bool MachineTransitions::effect_speaks_for_what_is_stated(const std::vector<std::size_t>& slots,
-                                                          const Fit& recalibrated, const Fit& wide) const {
+// Says whether one of the effects that promise most makes the runs likelier, with all parameters held to what is stated
+// of them, than a recalibration does that leaves some of them behind; of several variants one does by chance. What the
+// parameters are held with must not cost far more: an effect beside which they lie as far off does not speak for them.
+bool MachineTransitions::effect_speaks_for_what_is_stated(const Fit& recalibrated, const Fit& wide) const {
   std::vector<const Candidate*> all;
   for (const Candidate& one : candidates_) all.push_back(&one);
   const EffectScan scan = scan_effects(*this, recalibrated, all, 1);
@@ -405,8 +405,7 @@ bool MachineTransitions::effect_speaks_for_what_is_stated(const std::vector<std:
     const Fit with = fit(*this, recalibrated.nuisance, {term_at(effect, effect.best)});
     const double variants = static_cast<double>(effect.candidate->variants.size());
     return 2 * (with.log_likelihood - wide.log_likelihood - std::log(variants)) > Rules{}.told_apart &&
-           std::ranges::all_of(
-               slots, [&](std::size_t slot) { return sds_off(nuisances_[slot], with.nuisance[slot]) < misstated_sds; });
+           with.penalised > wide.penalised - far_behind;
   });
 }
 
@@ -427,7 +426,7 @@ void MachineTransitions::set_aside_what_is_misstated(const Fit& recalibrated) {
   if (Fit other = fit(*loose, nominal_values(*loose), {}, from_stated); other.penalised > wide.penalised)
     wide = std::move(other);
   const std::vector<std::size_t> slots = misstated_slots(*loose, wide.nuisance);
-  if (slots.empty() || effect_speaks_for_what_is_stated(slots, recalibrated, wide)) return;
+  if (slots.empty() || effect_speaks_for_what_is_stated(recalibrated, wide)) return;
   for (const std::size_t one : slots) nuisances_[one].misstated = 1;
 }
 

@@ -116,7 +116,7 @@ Table contact_table(const Diagnosis& d) {
               .columns = {{"parameter"}, {.name = "value (90 %)", .level = 90}}};
   for (const EstimatedParameter& p : d.gap.contact) table.rows.push_back({p.name, with_interval(p)});
   if (d.causes.beside.empty()) return table;
-  table.columns.push_back({.name = "beside " + d.causes.ranked.front().name() + " (90 %)", .level = 90});
+  table.columns.push_back({.name = "beside the likeliest effects (90 %)", .level = 90});
   for (std::size_t k = 0; k < table.rows.size(); ++k) table.rows[k].push_back(with_interval(d.causes.beside[k]));
   return table;
 }
