@@ -466,6 +466,13 @@ std::vector<std::string> sentences(const Diagnosis& d) {
   std::vector<std::string> all;
   say_verdict(all, d);
   if (!d.causes.even_push.empty()) all.push_back(d.causes.even_push);
+  if (std::ranges::any_of(d.causes.at_work, [&](const AtWork& one) {
+        return one.probability >= d.rules.least_at_work &&
+               std::ranges::find(one.effects, "memory") != one.effects.end();
+      }))
+    all.push_back(
+        "What the model leaves out of its state, as a second time constant or a hidden speed, shows as such a memory "
+        "of the noise, too.");
   if (!d.data.accepted_defects.empty())
     all.push_back(fmt::format("It stands on defects that were accepted: {}.", d.data.accepted_defects));
   say_where(all, d);

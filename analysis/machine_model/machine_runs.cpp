@@ -253,6 +253,14 @@ using RowColumn = double& (*)(MachineRow&, std::size_t);
 double& sensor_of(MachineRow& row, std::size_t which) { return row.seen[which]; }
 double& input_of(MachineRow& row, std::size_t which) { return row.inputs[which]; }
 
+// A map may not be defined for other signs of what has one sign only, as a level.
+bool has_both_signs(const MachineRuns& runs, RowColumn column, std::size_t which) {
+  bool above = false, below = false;
+  for (MachineTrial trial : runs.trials)
+    for (MachineRow& row : trial.rows) above = above || column(row, which) > 0, below = below || column(row, which) < 0;
+  return above && below;
+}
+
 // Moves a column by one row to later or earlier rows of its trials.
 MachineRuns shifted(const MachineRuns& runs, RowColumn column, std::size_t which, bool later) {
   MachineRuns moved = runs;
@@ -304,16 +312,21 @@ std::vector<MisreadRuns> misread_runs(const Machine& machine, const MachineRuns&
     for (const bool later : {true, false})
       all.push_back({fmt::format("{}: with its values one row {}", name, later ? "later" : "earlier"),
                      "is it one row off?", shifted(long_ones, column, which, later)});
-    all.push_back(
-        {name + ": with the other sign", "is its sign the other way round?", turned_round(long_ones, column, which)});
+    if (has_both_signs(runs, column, which))
+      all.push_back(
+          {name + ": with the other sign", "is its sign the other way round?", turned_round(long_ones, column, which)});
   };
   for (std::size_t j = 0; j < machine.observe.size(); ++j) add_column(machine.observe[j].state, sensor_of, j);
   for (std::size_t i = 0; i < machine.inputs.size(); ++i) add_column(machine.inputs[i], input_of, i);
   all.push_back(
       {"runs: with the rows of every trial in the opposite order", "do they run backwards?", backwards(long_ones)});
+  const auto known = [](const std::vector<double>& values) {
+    return std::ranges::all_of(values, [](double x) { return std::isfinite(x); });
+  };
   for (MisreadRuns& one : all)
-    std::erase_if(one.runs.trials, [](const MachineTrial& trial) {
-      return std::ranges::any_of(trial.rows.front().seen, [](double x) { return std::isnan(x); });
+    std::erase_if(one.runs.trials, [&](const MachineTrial& trial) {
+      return !known(trial.rows.front().seen) || !std::all_of(trial.rows.begin(), trial.rows.end() - 1,
+                                                             [&](const MachineRow& row) { return known(row.inputs); });
     });
   std::erase_if(all, [](const MisreadRuns& one) { return one.runs.trials.empty(); });
   return all;

@@ -69,8 +69,8 @@ struct MisreadRuns {
 };
 
 /// Returns the runs with each sensor and each input one row later and one row earlier, with its sign the other way
-/// round, and with the rows of every trial in the opposite order. Rows that are left without a value go, and trials do
-/// that have fewer than three rows, or lack a value in the first of them.
+/// round where it has both, and with the rows of every trial in the opposite order. Rows that are left without a value
+/// go, and trials do that have fewer than three rows, or lack a state in the first of them or an input before the last.
 std::vector<MisreadRuns> misread_runs(const Machine& machine, const MachineRuns& runs);
 
 /// Lists in sentences the signs that the runs are not this machine's: columns in other units, in all trials or in some;

@@ -34,6 +34,7 @@ constexpr double least_sensor = 1e-6, usual_sensor = 0.1;  // sd of an error tha
 constexpr double sensor_prior = 3;                         // sd of its logarithm
 constexpr std::size_t enough_levels = 5000;                // Chance moves the distribution of so many values by 0.01.
 constexpr std::uint64_t most_own_draws = 20, own_seed = 0x6f776e;
+constexpr const char* wild_name = "logit wild_share";
 constexpr double usual_wild = -7, wild_prior = 1.5, least_wild = -12;  // logit of the share of wild rows
 constexpr double parameter_step = 1e-3;  // of the sd with which it is known, for differences
 // A parameter is refitted within so many of its sds, or within this share of its nominal value where that is wider.
@@ -51,16 +52,13 @@ constexpr std::size_t most_instead = 3;
 constexpr double far_behind = 12;  // log likelihood below, with priors, that one more effect may still make up for
 constexpr double chance_sds = 2;   // So far from its mean chance takes what n numbers gain: n, with a variance of 2 n.
 
-// Failures that the model foretells in the steps recorded, from which trials that end early are asked about: none of so
-// many comes by chance in one data set of 150.
+// Failures foretold in the steps recorded, for trials that end early to be asked about: none comes in one set of 150.
 constexpr double foretold_failures = 5;
 
-// A column is asked about where it fits better in another row or with another sign: by so many nats a value, what a
-// normal error does that becomes smaller by a tenth, and by so many in all, far beyond chance.
+// A misread column fits better by so many nats a value, a normal error's tenth, and by so many in all, beyond chance.
 constexpr double misread_nats = 0.1, misread_nats_in_all = 30;
 constexpr std::size_t enough_to_suspect = 500;  // steps in which it is looked for
-
-constexpr double few_failures = 10;  // counted ones, that say next to nothing of the expected steps
+constexpr double few_failures = 10;             // counted ones, that say next to nothing of the expected steps
 
 bool is_outliers(const EffectTerm& term) { return term.candidate->id == "outliers"; }
 
@@ -241,7 +239,7 @@ void MachineTransitions::set_up_nuisances() {
   }
   if (machine_->most_wild > 0) {
     const double most = std::log(machine_->most_wild / (1 - machine_->most_wild));
-    nuisances_.push_back({"logit wild_share", std::min(usual_wild, most - wild_prior), wild_prior, 1e-2,
+    nuisances_.push_back({wild_name, std::min(usual_wild, most - wild_prior), wild_prior, 1e-2,
                           std::min(least_wild, most - 2 * wild_prior), most});
   }
 }
@@ -370,12 +368,15 @@ std::vector<NamedValue> MachineTransitions::report_nuisances(std::span<const dou
 
 double sds_off(const Nuisance& stated, double value) { return std::abs(value - stated.nominal) / stated.prior_sd; }
 
-// Lists the parameters of the machine that are far from where they are stated, by their slots.
-std::vector<std::size_t> misstated_slots(const TransitionModel& model, const std::vector<double>& nuisance) {
+// Lists the parameters that are far from what is stated of them, by their slots: those of which that was set aside;
+// beside effects, which may hold a parameter there, any.
+std::vector<std::size_t> misstated_slots(const TransitionModel& model, const std::vector<double>& nuisance,
+                                         bool beside_effects = false) {
   std::vector<std::size_t> all;
   for (std::size_t slot = 0; slot < nuisance.size(); ++slot)
     if (const Nuisance& one = model.nuisances()[slot];
-        one.misstated > 0 && sds_off(one, nuisance[slot]) > misstated_sds)
+        (one.misstated > 0 || (beside_effects && !one.assumed && one.name != wild_name)) &&
+        sds_off(one, nuisance[slot]) > misstated_sds)
       all.push_back(slot);
   return all;
 }
@@ -390,8 +391,8 @@ std::unique_ptr<MachineTransitions> MachineTransitions::with_wide_priors() const
 }
 
 // Says whether one of the effects that promise most makes the runs likelier, with all parameters held to what is stated
-// of them, than a recalibration does that leaves some of them behind; of several variants one does by chance. What the
-// parameters are held with must not cost far more: an effect beside which they lie as far off does not speak for them.
+// of them, than a recalibration that leaves some behind; of several variants one does by chance. It does not speak for
+// what is stated where it leaves them as far off, at the cost of their priors.
 bool MachineTransitions::effect_speaks_for_what_is_stated(const Fit& recalibrated, const Fit& wide) const {
   std::vector<const Candidate*> all;
   for (const Candidate& one : candidates_) all.push_back(&one);
@@ -453,9 +454,8 @@ double MachineTransitions::mean_log_density(const Evaluation& evaluation) const 
   return count > 0 ? sum / count : -std::numeric_limits<double>::infinity();
 }
 
-// A column that was misread passes for effects, and for parameters that are far off. A part of the trials shows which
-// change makes them likelier.
-void MachineTransitions::ask_for_misread_columns(const Fit& recalibrated) {
+// A column that was misread passes for effects, and for parameters that are far off. A part of the trials shows it.
+void MachineTransitions::ask_for_misread_columns(const Fit& recalibrated) try {
   const double here = mean_log_density(recalibrated.evaluation);
   const std::vector<MisreadRuns> parts = misread_runs(*machine_, thinned(runs_, enough_to_suspect));
   const std::vector<double> starts[]{nominal_values(*this), recalibrated.nuisance};
@@ -474,6 +474,7 @@ void MachineTransitions::ask_for_misread_columns(const Fit& recalibrated) {
   if (gain > std::max(misread_nats, misread_nats_in_all / values))  // It may settle other questions.
     notes_.insert(notes_.begin(),
                   fmt::format("{} the model fits by {:.2g} nats a value better: {}", read.change, gain, read.question));
+} catch (const std::invalid_argument&) {  // The map need not be defined where no row was measured.
 }
 
 // Returns, in ascending order, the levels of the measured values of runs drawn from the model: the share of values
@@ -544,7 +545,7 @@ bool MachineTransitions::only_wild_rows(const Fit& recalibrated) const {
 }
 
 std::vector<std::string> MachineTransitions::misstated(const Fit& fitted) const {
-  const std::vector<std::size_t> slots = misstated_slots(*this, fitted.nuisance);
+  const std::vector<std::size_t> slots = misstated_slots(*this, fitted.nuisance, !fitted.terms.empty());
   if (fitted.terms.empty() && slots.empty() && only_wild_rows(fitted))
     return {fmt::format(
         "Nothing but the share of wild rows, {:.2g}, differs from the model as given by more than chance may make it.",

@@ -91,6 +91,7 @@ TEST(MachineAnswers, SayThatAMemoryBelowZeroAlternatesAsPhasesDo) {
   const auto said = [](const Diagnosis& d) { return d.causes.size.find("phases left and right"); };
   const Diagnosis d = answer_to(linear_machine(0.02), runs, {"memory", "b_spread"});
   ASSERT_EQ(d.causes.set, std::vector<std::string>{"memory"}) << told(d);
+  EXPECT_NE(told(d).find("What the model leaves out of its state"), std::string::npos) << told(d);
   EXPECT_NE(said(d), std::string::npos) << told(d);
   for (MachineTrial& one : runs.trials)
     for (std::size_t k = 0; k < one.rows.size(); ++k) one.rows[k].phase = static_cast<int>(k / 2 % 2);

@@ -26,6 +26,36 @@ TEST(MachineRunsColumn, FarFromZeroKeepsItsSpread) {
   EXPECT_DOUBLE_EQ(column_spread(runs, 0).sd, std::sqrt(2.0 / 3));
 }
 
+// A level has one sign. The last row of a trial begins no step, and may lack its input.
+TEST(MisreadRuns, HoldEachChangeOfEachColumn) {
+  Machine machine = linear_machine(0.05);
+  machine.inputs = {"force"};
+  MachineRuns runs;
+  runs.trials.resize(2);
+  runs.trials[0].rows = {{.seen = {1}, .inputs = {-1}}, {.seen = {2}, .inputs = {2}}, {.seen = {3}, .inputs = {4}}};
+  runs.trials[1].rows = {{.seen = {5}, .inputs = {1}}, {.seen = {6}, .inputs = {1}}};  // too few
+  const auto changes = [&] {
+    std::string all;
+    for (const MisreadRuns& one : misread_runs(machine, runs)) all += one.change + "\n";
+    return all;
+  };
+  const std::string shifts =
+      "x: with its values one row later\nx: with its values one row earlier\n"
+      "force: with its values one row later\nforce: with its values one row earlier\n"
+      "force: with the other sign\n";
+  EXPECT_EQ(changes(), shifts + "runs: with the rows of every trial in the opposite order\n");
+  const std::vector<MisreadRuns> all = misread_runs(machine, runs);
+  ASSERT_EQ(all.back().runs.trials.size(), 1U);
+  EXPECT_EQ(all.back().runs.trials[0].rows[0].seen[0], 3);
+  EXPECT_EQ(all.back().runs.trials[0].rows[0].inputs[0], 4);
+  const std::vector<MachineRow> later = all[2].runs.trials[0].rows;
+  ASSERT_EQ(later.size(), 2U);
+  EXPECT_EQ(later[0].seen[0], 2);
+  EXPECT_EQ(later[0].inputs[0], -1);
+  runs.trials[0].rows[2].inputs = {missing};
+  EXPECT_EQ(changes(), shifts);
+}
+
 class LookedOver : public ::testing::Test {
  protected:
   LookedOver() {
