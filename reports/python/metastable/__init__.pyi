@@ -208,6 +208,7 @@ class Diagnosis(Result):
     stepwise: Record
     not_decided: Tuple[Record, ...]
     contact: Record
+    contact_beside_effects: Record
     shrinkage: Record
     shrinkage_by_measure: Tuple[Record, ...]
     steps_before_failure: Record
