@@ -337,8 +337,8 @@ TEST(MachineTransitions, AThresholdThatIsOffIsFound) {
   EXPECT_NEAR(d.causes.ranked.front().parameters[0][0].value, 0.15, 0.03) << said(d);
 }
 
-// Where the model as given has nearly all values in the tails that wild rows make, a score there is worth far more than
-// in its middle, and the mean distance from it came out 48 times too large.
+// A score in the tails that wild rows make is worth a far larger distance than one in the middle. The mean distance
+// came out 48 times too large where the model as given had nearly all values in its tails.
 TEST(MachineTransitions, TailsTellNoDistance) {
   Machine machine = linear_machine(0.05);
   machine.most_wild = 0.01;
