@@ -443,6 +443,16 @@ void say_question(Diagnosis& d, const std::string& question) {
   d.sentences.insert(d.sentences.begin() + static_cast<std::ptrdiff_t>(behind), std::string(opening) + question);
 }
 
+// Says behind the verdict which parameters lie far from what is stated of them. Of a gap without a name nothing else is
+// said to be refitted: more than that differs.
+void say_misstated(Diagnosis& d, const TransitionModel& model, const Fit& fit) {
+  if (d.verdict == Verdict::no_gap) return;
+  std::vector<std::string> said = model.misstated(fit);
+  if (d.verdict == Verdict::unexplained)
+    std::erase_if(said, [](const std::string& one) { return one.find("of its stated sds") == one.npos; });
+  std::ranges::move(said, std::inserter(d.sentences, std::next(d.sentences.begin())));
+}
+
 // Says what steps the machine and its models take; those that were counted alone, where the models have none to tell.
 void add_steps(Diagnosis& d, const TransitionModel& model, const Fitted& fitted, const Fit& cause,
                const std::vector<const RankedCause*>& ordered, const Elsewhere& elsewhere,
@@ -497,8 +507,7 @@ Diagnosis answer(const TransitionModel& model, const Fitted& fitted, Decided dec
   d.limits.at_bound = values_at_bound(model, cause);
   if (named) d.causes.beside = contact_estimates(model, cause);
   d.sentences = sentences(d);
-  if (named || d.verdict == Verdict::recalibrate)  // It stands behind the verdict.
-    std::ranges::move(model.misstated(cause), std::inserter(d.sentences, std::next(d.sentences.begin())));
+  say_misstated(d, model, named ? cause : fitted.recalibrated);
   for (const std::string& note : d.data.notes)
     if (note.ends_with('?')) say_question(d, note);
   for (const AtBound& one : d.limits.at_bound) d.sentences.push_back(at_bound_in_words(one, cause.terms));

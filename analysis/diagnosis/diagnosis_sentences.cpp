@@ -4,6 +4,7 @@
 #include <fmt/ranges.h>
 
 #include <algorithm>
+#include <cctype>
 #include <cmath>
 
 #include "analysis/diagnosis/not_possible.h"
@@ -17,7 +18,9 @@ constexpr std::size_t most_parameters = 3;  // of an effect that a sentence name
 constexpr double shown_level = 0.05;        // of a cell, for a sentence
 constexpr double worth_saying = 3;          // evidence in a facet
 constexpr double worth_naming = 10;         // gain of the nearest effect where none explains the gap
-constexpr std::size_t most_pieces = 10;     // So many pieces of a log that is cut put two into each of five folds.
+// It stands for effects that act alike where the field has no word for all of them.
+constexpr const char* without_word = "one of several that act alike in these trials";
+constexpr std::size_t most_pieces = 10;  // So many pieces of a log that is cut put two into each of five folds.
 
 std::string with_parameters(const Cause& cause) {
   std::string text;
@@ -43,9 +46,10 @@ std::string grouped_set(const Diagnosis& d) {
     std::erase_if(one, [&](const std::string& effect) { return std::ranges::find(common, effect) != common.end(); });
     own.push_back(fmt::format("{}", fmt::join(one, "+")));
   }
-  std::string text =
-      fmt::format("{}{} ({})", common_name(d.data.groups, own),
-                  common.empty() ? "" : fmt::format(" beside {}", fmt::join(common, " and ")), fmt::join(own, ", "));
+  const std::string name = common_name(d.data.groups, own);
+  std::string text = name == without_word ? fmt::format("{} (alike in these trials)", fmt::join(own, " or "))
+                                          : fmt::format("{} ({})", name, fmt::join(own, ", "));
+  if (!common.empty()) text += fmt::format(" beside {}", fmt::join(common, " and "));
   for (const std::string& name : d.causes.set)
     if (std::ranges::find(d.causes.alike, name) == d.causes.alike.end()) text += ", " + name;
   return text;
@@ -172,10 +176,10 @@ void say_explained(std::vector<std::string>& s, const Diagnosis& d) {
   if (!d.causes.size.empty()) s.push_back(d.causes.size);
   if (const auto left =
           std::ranges::count_if(d.gap.left.cells, [](const GapCell& cell) { return cell.p_adjusted < shown_level; }))
-    s.push_back(
-        fmt::format("It leaves {} {} of the map beyond chance, by no more than the {:.0f} % of its own size "
-                    "that the form of a cause is allowed to be off.",
-                    left, left == 1 ? "cell" : "cells", 100 * d.rules.model_error));
+    s.push_back(fmt::format(
+        "It leaves {} {} of the map beyond chance. What is left there is at most {:.0f} % of the effect, an error that "
+        "its form is allowed to have.",
+        left, left == 1 ? "cell" : "cells", 100 * d.rules.model_error));
 }
 
 void say_unexplained(std::vector<std::string>& s, const Diagnosis& d) {
@@ -210,8 +214,9 @@ void say_unexplained(std::vector<std::string>& s, const Diagnosis& d) {
     s.push_back("There is a gap that no effect of the catalogue, nor several, removes: something else is at work.");
     if (d.causes.together > d.rules.most_together)
       s.push_back(fmt::format(
-          "The nearest of the catalogue is {}, but these gain {:.1f} times as much together as alone: separate "
-          "causes would add up, these bend one another into the shape of something else.",
+          "The nearest of the catalogue is {}, and it is not named. Its effects together raise the likelihood (2 Δ ln "
+          "L) {:.1f} times as much as they do one by one. Separate causes would add up; these are likely to imitate "
+          "something else.",
           d.causes.ranked.front().name(), d.causes.together));
     else if (any && d.causes.ranked.front().gain > worth_naming)
       s.push_back(fmt::format("The nearest of the catalogue is {}; what it leaves is in the map.",
@@ -331,6 +336,12 @@ void say_machine_steps(std::vector<std::string>& s, const Diagnosis& d) {
   }
 }
 
+// A number of trials that is far from what was run is known to two digits at most.
+std::string rounded_trials(std::size_t trials) {
+  if (trials < 100) return std::to_string(trials);
+  return "about " + format_number(static_cast<double>(trials), NumberFormat::general, 2);
+}
+
 void say_what_is_hidden(std::vector<std::string>& s, const Diagnosis& d) {
   for (const MissingColumn& missing : d.limits.missing) {
     std::vector<std::string> hidden;
@@ -340,11 +351,11 @@ void say_what_is_hidden(std::vector<std::string>& s, const Diagnosis& d) {
       s.push_back(fmt::format("Without {}, {} cannot be told; what they do may show under other names.", missing.column,
                               fmt::join(hidden, ", ")));
   }
-  std::vector<std::string> too_few;
   for (const NotPossible& n : d.limits.not_possible)
     if (n.of_the_gap)
-      too_few.push_back(n.trials ? fmt::format("{} ({} trials would do)", n.statement, *n.trials) : n.statement);
-  if (!too_few.empty()) s.push_back(fmt::format("Too few trials to say {}.", fmt::join(too_few, ", ")));
+      s.push_back(n.trials
+                      ? fmt::format("It takes {} trials like these to say {}.", rounded_trials(*n.trials), n.statement)
+                      : fmt::format("These trials are too few to say {}.", n.statement));
 }
 
 // Says out of what effects can be taken: errors of sensors, by their ids, are no part of the machine.
@@ -370,7 +381,7 @@ std::string common_name(const std::vector<EffectGroup>& groups, const std::vecto
     if (std::ranges::all_of(
             alike, [&](const std::string& id) { return std::ranges::find(group.members, id) != group.members.end(); }))
       return group.name;
-  return "alike in these trials";
+  return without_word;
 }
 
 bool closed_is_known(const Shrinkage& s) {
@@ -417,7 +428,8 @@ std::string more_trials(const Diagnosis& d, std::size_t would_do) {
       would_do, d.data.collisions / pieces, pieces);
 }
 
-std::string next_step(const Diagnosis& d) {
+// Says what to do where the data hold what they seem to hold.
+std::string step_by_verdict(const Diagnosis& d) {
   switch (d.verdict) {
     case Verdict::no_gap:
       return "Use the model as it is. An effect below its smallest size under “What these data could have seen” would "
@@ -462,17 +474,42 @@ std::string next_step(const Diagnosis& d) {
   return "";
 }
 
+std::string next_step(const Diagnosis& d) {
+  std::string step = step_by_verdict(d);
+  const auto asked = std::ranges::count_if(d.data.notes, [](const std::string& note) { return note.ends_with('?'); });
+  if (asked == 0) return step;
+  step.front() = static_cast<char>(std::tolower(static_cast<unsigned char>(step.front())));
+  return fmt::format(
+      "First answer the {} about the data. If the answer changes the data or the machine, diagnose them anew. If it "
+      "changes nothing, {}",
+      asked == 1 ? "question" : "questions", step);
+}
+
+namespace {
+
+void say_missing_state(std::vector<std::string>& all, const Diagnosis& d) {
+  const auto named = [&](const auto& is) {
+    return std::ranges::any_of(d.causes.at_work, [&](const AtWork& one) {
+      return one.probability >= d.rules.least_at_work && std::ranges::any_of(one.effects, is);
+    });
+  };
+  if (named([](const std::string& effect) { return effect.starts_with("hidden_state_"); }))
+    all.emplace_back(
+        "A hidden state is one that the model lacks, as the temperature of a wall, the speed behind a joint that "
+        "gives, or what a slow sensor has not shown yet: give the model such a state, and diagnose anew.");
+  else if (named([](const std::string& effect) { return effect == "memory"; }))
+    all.emplace_back(
+        "What the model leaves out of its state, as a second time constant or a hidden speed, shows as such a memory "
+        "of the noise, too.");
+}
+
+}  // namespace
+
 std::vector<std::string> sentences(const Diagnosis& d) {
   std::vector<std::string> all;
   say_verdict(all, d);
   if (!d.causes.even_push.empty()) all.push_back(d.causes.even_push);
-  if (std::ranges::any_of(d.causes.at_work, [&](const AtWork& one) {
-        return one.probability >= d.rules.least_at_work &&
-               std::ranges::find(one.effects, "memory") != one.effects.end();
-      }))
-    all.push_back(
-        "What the model leaves out of its state, as a second time constant or a hidden speed, shows as such a memory "
-        "of the noise, too.");
+  say_missing_state(all, d);
   if (!d.data.accepted_defects.empty())
     all.push_back(fmt::format("It stands on defects that were accepted: {}.", d.data.accepted_defects));
   say_where(all, d);

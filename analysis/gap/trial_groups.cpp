@@ -9,6 +9,7 @@
 #include <functional>
 #include <map>
 #include <numbers>
+#include <string_view>
 #include <utility>
 
 #include "analysis/fitting/rules.h"
@@ -35,6 +36,8 @@ constexpr std::size_t most_named = 5;    // The sentence names so many trials.
 constexpr double least_weight = 1e-12;
 constexpr int drift_degree = 3;                 // of a polynomial that a break is held against
 constexpr std::size_t fewest_for_a_break = 12;  // trials
+constexpr std::string_view by_label = "_by_";   // in the id of an effect, before the label that it goes by
+constexpr std::size_t one_astray = 10;          // One trial of so many in the smaller group may have another label.
 
 struct GroupSums {
   double weight = 0, first = 0, second = 0;
@@ -196,6 +199,48 @@ double by_chance(double gain, std::size_t trials, std::uint64_t seed, Value valu
   return excess > 0 ? static_cast<double>(counted_draws) / split_draws * std::exp(-(gain - edge) / excess) : 0;
 }
 
+// Returns [trials] whether an effect acts on a trial; nothing where it acts on some of a trial's steps alone.
+std::optional<std::vector<bool>> acts_on(const TransitionModel& model, const EffectTerm& term) {
+  const std::optional<Addition> added = model.addition(term, 0);
+  if (!added) return {};
+  double most = 0;
+  for (const double weight : added->weights) most = std::max(most, std::abs(weight));
+  std::vector<bool> acts;
+  auto step = added->weights.begin();
+  for (const std::size_t steps : model.transitions()) {
+    const auto end = step + static_cast<std::ptrdiff_t>(steps);
+    const auto on = std::count_if(step, end, [&](double weight) { return std::abs(weight) > most / 2; });
+    if (on > 0 && on < end - step) return {};
+    acts.push_back(on > 0);
+    step = end;
+  }
+  return acts;
+}
+
+// Returns the label whose values are the two groups, as the effects by it tell them; empty: there is none.
+std::string label_of(const TransitionModel& model, const TwoGroups& groups) {
+  const std::size_t most_astray = groups.fewer.size() / one_astray, not_sorted = model.trials() - groups.sorted;
+  const auto are_these = [&](const std::vector<bool>& acts, bool value) {
+    std::size_t others = 0, missing = 0;
+    for (std::size_t t = 0; t < acts.size(); ++t) {
+      const bool in_group = std::ranges::binary_search(groups.fewer, t);
+      others += acts[t] == value && !in_group;
+      missing += acts[t] != value && in_group;
+    }
+    return missing <= most_astray && others <= most_astray + not_sorted;
+  };
+  for (const Candidate& one : model.candidates()) {
+    const std::size_t at = one.id.rfind(by_label);
+    if (at == std::string::npos || one.parameters.size() != 1) continue;
+    for (const std::vector<double>& value : one.variants) {
+      if (value.size() != 1) continue;
+      const auto acts = acts_on(model, {&one, value, {one.parameters[0].neutral}});
+      if (acts && (are_these(*acts, true) || are_these(*acts, false))) return one.id.substr(at + by_label.size());
+    }
+  }
+  return "";
+}
+
 }  // namespace
 
 std::optional<TwoGroups> split(std::vector<TrialValue> values) {
@@ -285,7 +330,8 @@ std::optional<TrialGroups> trial_groups(const TransitionModel& model, const Effe
       for (const TrialValue& one : trial_values(model, *along, without_spreads(model, chosen).score)) left.add(one);
       if (left.weight > 0 && most.within > Rules::most_left_by_groups * left.squares()) continue;
     }
-    return TrialGroups{along->name, std::move(most), in_order};
+    std::string label = label_of(model, most);
+    return TrialGroups{along->name, std::move(most), in_order, std::move(label)};
   }
   return {};
 }
@@ -296,9 +342,11 @@ std::string trial_groups_in_words(const TransitionModel& model, const TrialGroup
   for (std::size_t i = 0; i < std::min(most_named, fewer.size()); ++i) names.push_back(model.trial_name(fewer[i]));
   return fmt::format(
       "the trials fall into two groups{} that one set of parameters does not hold: {} of {} (trials {}{}) lie {:.2g} "
-      "sds of a trial from the others along {}: are these the trials of two machines, or of one that was changed?",
+      "sds of a trial from the others along {}{}",
       found.in_order ? ", one after the other," : "", fewer.size(), found.groups.sorted, fmt::join(names, ", "),
-      fewer.size() > most_named ? ", ..." : "", found.groups.apart, found.along);
+      fewer.size() > most_named ? ", ..." : "", found.groups.apart, found.along,
+      found.label.empty() ? ": are these the trials of two machines, or of one that was changed?"
+                          : fmt::format("; the label {} tells the same groups apart", found.label));
 }
 
 }  // namespace metastable::analysis

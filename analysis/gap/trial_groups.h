@@ -48,6 +48,7 @@ struct TrialGroups {
   std::string along;  ///< name of a parameter that is refitted, or of an effect
   TwoGroups groups;
   bool in_order = false;  ///< one group comes after the other, and does not lie far enough apart to be told otherwise
+  std::string label;      ///< column whose values the groups are; empty: none is known
 };
 
 /// Looks along every parameter that is refitted and every effect that all trials show alike, within the conditions.
@@ -56,7 +57,7 @@ struct TrialGroups {
 std::optional<TrialGroups> trial_groups(const TransitionModel& model, const EffectScan& scan, const Fit& recalibrated,
                                         const Fit& chosen, std::uint64_t seed);
 
-/// Says it in a sentence; names the first trials of the smaller group.
+/// Says it in a sentence, and asks for the reason where no label is that; names the first trials of the smaller group.
 std::string trial_groups_in_words(const TransitionModel& model, const TrialGroups& found);
 
 }  // namespace metastable::analysis

@@ -21,7 +21,6 @@ constexpr std::size_t most_states = 30;
 constexpr int most_scores = 16;
 constexpr double beyond_all_bounds = 1e100;  // size of a state from which a map may overflow
 constexpr std::size_t most_works = 8;  // works whose steps are joined: more of them hold more memory and save little
-thread_local const markov::BatchMap* joined = nullptr;  // of the work that runs on this thread; nullptr: none
 
 void require_finite(const std::string& what, double value) {
   if (!std::isfinite(value)) throw std::invalid_argument(fmt::format("{}: {} is not a finite number", what, value));
@@ -256,7 +255,7 @@ void step_jointly(const MachineBatch& batch) {
     given.insert(given.end(), own.begin(), own.end());
     for (std::size_t v = 0; v < batch.values.size(); ++v) given.push_back(batch.value(v, row));
   }
-  joined->step(0, batch.states, given, batch.next, batch.failed);
+  markov::joined_map()->step(0, batch.states, given, batch.next, batch.failed);
 }
 
 }  // namespace
@@ -264,7 +263,7 @@ void step_jointly(const MachineBatch& batch) {
 Machine joining_steps(std::shared_ptr<const Machine> machine) {
   Machine all = *machine;
   all.step = [machine = std::move(machine)](const MachineBatch& batch) {
-    if (batch.rows > 0 && joined)
+    if (batch.rows > 0 && markov::joined_map())
       step_jointly(batch);
     else
       machine->step(batch);
@@ -274,19 +273,12 @@ Machine joining_steps(std::shared_ptr<const Machine> machine) {
 
 void side_by_side(const Machine& machine, std::size_t count, int threads,
                   const std::function<void(std::size_t)>& work) {
-  if (joined || count < 2) {
+  if (markov::joined_map() || count < 2) {
     for (std::size_t i = 0; i < count; ++i) work(i);
     return;
   }
-  markov::joined_for(joint_map(machine), count, most_works, threads, [&](std::size_t i, const markov::BatchMap& map) {
-    struct Joined {
-      explicit Joined(const markov::BatchMap& map) { joined = &map; }
-      ~Joined() { joined = nullptr; }
-      Joined(const Joined&) = delete;
-      Joined& operator=(const Joined&) = delete;
-    } const here(map);
-    work(i);
-  });
+  markov::joined_for(joint_map(machine), count, most_works, threads,
+                     [&](std::size_t i, const markov::BatchMap&) { work(i); });
 }
 
 }  // namespace metastable::analysis

@@ -88,6 +88,8 @@ struct Machine {
   std::vector<std::string> inputs;      ///< recorded numbers that a step is given, by their columns' names
   /// A call of `step` costs much more than a row, as where an interpreter runs it.
   bool dear = false;
+  /// The states are all that the machine has: no effect is a state that the map lacks.
+  bool whole_state = false;
   double most_wild = 0.01;  ///< largest share of rows that may be wild (missed events, bad tracks), [0, 0.2]
   std::map<std::string, std::string> units;  ///< Stated of states, values and inputs; names may tell theirs.
 

@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 
+#include <Eigen/QR>
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -125,13 +126,17 @@ void measure_inputs(MachineDesign& design, const Machine& machine, const Machine
     std::set<double> values;
     std::map<int, double> of_phase;
     std::vector<double> all;
+    const auto then = [&](std::size_t trial, std::size_t row, std::size_t steps) {
+      const RowPlace at = row_before(runs, trial, row, steps);
+      return runs.trials[at.trial].rows[at.row].inputs[i];
+    };
     for (const StepPlace& at : design.steps) {
       const std::vector<MachineRow>& rows = runs.trials[at.trial].rows;
       const auto row = static_cast<std::size_t>(at.number) - 1;
       const double here = all.emplace_back(rows[row].inputs[i]);
       values.insert(here);
       course.by_phase = course.by_phase && of_phase.try_emplace(at.phase, here).first->second == here;
-      course.changes = course.changes || here != rows.front().inputs[i];
+      course.changes = course.changes || here != then(at.trial, row, 1) || here != rows.front().inputs[i];
     }
     course.code = machine.unit_of(machine.inputs[i]).empty() && values.size() <= most_codes &&
                   std::ranges::all_of(values, [](double x) { return x == std::floor(x); });
@@ -143,8 +148,7 @@ void measure_inputs(MachineDesign& design, const Machine& machine, const Machine
     for (StepPlace& at : design.steps)
       for (std::size_t lag = 0; lag < input_lags; ++lag) {
         const auto row = static_cast<std::size_t>(at.number) - 1;
-        const double then = runs.trials[at.trial].rows[row > lag ? row - lag : 0].inputs[i];
-        at.inputs.push_back(sd > 0 ? (then - mean) / sd : 0);
+        at.inputs.push_back(sd > 0 ? (then(at.trial, row, lag) - mean) / sd : 0);
       }
   }
 }
@@ -271,7 +275,8 @@ MachineDesign machine_design(const Machine& machine, const MachineRuns& runs) {
   for (std::size_t j = 0; j < machine.observe.size(); ++j) design.first.push_back(first_values(runs, j));
   measure_place(design, runs);
   const double last = runs.trials.size() > 1 ? static_cast<double>(runs.trials.size() - 1) : 1;
-  for (std::size_t t = 0; t < runs.trials.size(); ++t)
+  for (std::size_t t = 0; t < runs.trials.size(); ++t) {
+    design.goes_on.push_back(goes_on(runs, t));
     for (std::size_t k = 0; k < steps_of(runs.trials[t]); ++k) {
       const MachineRow& row = runs.trials[t].rows[k];
       StepPlace place{t,
@@ -287,9 +292,56 @@ MachineDesign machine_design(const Machine& machine, const MachineRuns& runs) {
             std::isnan(row.seen[j]) || !(design.sd[j] > 0) ? 0 : (row.seen[j] - design.mean[j]) / design.sd[j]);
       design.steps.push_back(std::move(place));
     }
+  }
   for (std::size_t j = 0; j < machine.observe.size(); ++j) design.along_order.push_back(along_order(design, runs, j));
   measure_inputs(design, machine, runs);
   return design;
+}
+
+std::vector<double> ahead_of(const MachineDesign& design, std::size_t sensor, double kept) {
+  double hidden = 0, seen = 0;  // in sds of the column
+  bool begun = false;
+  return by_step(design, [&](const StepPlace& at) {
+    const double here = at.seen[sensor];  // It is 0 where the value is missing.
+    if (at.number == 1) begun = begun && design.goes_on[at.trial];
+    if (begun) hidden += (1 - kept) * (seen - hidden);
+    if (here == 0) return 0.0;
+    if (!begun) hidden = here;
+    begun = true;
+    seen = here;
+    return design.sd[sensor] * (hidden - here);
+  });
+}
+
+double share_beside_states(const MachineDesign& design, std::size_t sensor, const std::vector<double>& number) {
+  constexpr Eigen::Index powers = 4;
+  const auto steps = static_cast<Eigen::Index>(design.steps.size());
+  const auto sensors = static_cast<Eigen::Index>(design.sd.size());
+  Eigen::MatrixXd all(steps, powers + sensors);  // The last column is the number.
+  for (Eigen::Index k = 0; k < steps; ++k) {
+    const std::vector<double>& seen = design.steps[static_cast<std::size_t>(k)].seen;
+    for (Eigen::Index power = 0; power < powers; ++power) all(k, power) = std::pow(seen[sensor], power);
+    for (Eigen::Index j = 0, at = powers; j < sensors; ++j)
+      if (j != static_cast<Eigen::Index>(sensor)) all(k, at++) = seen[static_cast<std::size_t>(j)];
+    all(k, powers + sensors - 1) = number[static_cast<std::size_t>(k)];
+  }
+  const double square = (all.col(powers + sensors - 1).array() - all.col(powers + sensors - 1).mean()).square().sum();
+  if (!(square > 0)) return 0;
+  if (design.trials >= trials_of_a_spread) {
+    std::map<int, std::pair<double, Eigen::RowVectorXd>> by_number;  // count and sum of a step's rows over the trials
+    for (Eigen::Index k = 0; k < steps; ++k) {
+      auto& [count, sum] = by_number[design.steps[static_cast<std::size_t>(k)].number];
+      sum = count > 0 ? Eigen::RowVectorXd(sum + all.row(k)) : Eigen::RowVectorXd(all.row(k));
+      ++count;
+    }
+    for (Eigen::Index k = 0; k < steps; ++k) {
+      const auto& [count, sum] = by_number[design.steps[static_cast<std::size_t>(k)].number];
+      all.row(k) -= sum / count;
+    }
+  }
+  const auto by = all.leftCols(powers + sensors - 1);
+  const Eigen::VectorXd of = all.col(powers + sensors - 1);
+  return (of - by * by.colPivHouseholderQr().solve(of)).squaredNorm() / square;
 }
 
 std::string replayed_inputs(const Machine& machine, const MachineDesign& design) {

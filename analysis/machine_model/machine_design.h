@@ -55,10 +55,20 @@ struct MachineDesign {
   std::vector<double> usual_change;                     ///< by sensor: root mean square of that change
   std::vector<double> along_order;  ///< by sensor: correlation of its column with the order of trials
   std::vector<FirstValues> first;   ///< by sensor
+  std::vector<bool> goes_on;        ///< by trial: goes_on() of machine_runs.h
   std::vector<InputCourse> inputs;
 };
 
 MachineDesign machine_design(const Machine& machine, const MachineRuns& runs);
+
+/// Returns by step how far a state that the map lacks is ahead of a measured one that it follows: it takes on a share
+/// 1 - kept of their distance at each step. It begins at that state, or where it was when the trial goes on with the
+/// one before; a value that is missing leaves it where it is.
+std::vector<double> ahead_of(const MachineDesign& design, std::size_t sensor, double kept);
+
+/// Returns the share of the variance of a number of each step that neither a cubic of a measured state, a line of the
+/// others nor, from five trials on, the number of the step has.
+double share_beside_states(const MachineDesign& design, std::size_t sensor, const std::vector<double>& number);
 
 /// Says in a sentence why a machine whose inputs were recorded tells no expected steps, "" where no input changes
 /// within a trial but by the phase: a simulation would replay the inputs, which a machine that is held by feedback does

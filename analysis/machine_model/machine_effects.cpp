@@ -22,6 +22,10 @@ constexpr double most_sds = 5;         //   of the sd with which it is known: ho
 constexpr std::size_t most_waves = 512, fewest_waves = 128;
 constexpr double waves_apart = 0.5;
 constexpr int stretches = 6;  // of the way
+// A sine of the clock is not told from what the switches of an input do where so much of them, by their sizes, falls on
+// one phase of it. Fewer switches fall on one by chance.
+constexpr double most_in_phase = 0.8;
+constexpr std::size_t fewest_switches = 3;
 // A drift is not told from what changes with a state whose column keeps less than a tenth of its variance beside the
 // order of trials.
 constexpr double most_along_order = 0.95;
@@ -32,8 +36,15 @@ constexpr double largest_memory = 0.9, all_noises = -1;
 constexpr double usual_bias = 0.1, bias_errors = 3;
 constexpr double largest_share = 0.2;  // of outliers
 constexpr double longest_lag = 3;      // Inputs act so many steps late at most.
-constexpr double widest_launch = 10;   // launches are off by so many of their stated sds at most, at least
-constexpr double launch_errors = 4;    // standard errors from which on first rows suggest a size by themselves
+constexpr double longest_kept = 0.98;  // A filter of an input keeps such a share from step to step at most.
+// States that the map lacks follow a measured one with time constants this far apart (of their logarithms), from this
+// shortest one [steps] to the longest trial; trials of so few steps show none.
+constexpr double constants_apart = 0.5, shortest_constant = 1.5;
+constexpr std::size_t fewest_followed = 8;
+// They are not told from what changes with the states where these leave less of their variance, at every constant.
+constexpr double least_beside_states = 0.2;
+constexpr double widest_launch = 10;  // launches are off by so many of their stated sds at most, at least
+constexpr double launch_errors = 4;   // standard errors from which on first rows suggest a size by themselves
 
 // Returns how far a parameter may vary to either side.
 double range_of(const MachineParameter& p) {
@@ -72,6 +83,25 @@ std::function<std::vector<NamedValue>(const Values&, const Values&)> changed_in(
   return [names = std::move(names)](const Values& at, const Values& v) {
     return std::vector<NamedValue>{{"change_in_" + names.at(static_cast<std::size_t>(at[0])), v[0]}};
   };
+}
+
+// Says whether an input switches at one phase of a sine of the clock, period by period.
+bool input_switches_at(const MachineDesign& design, double frequency) {
+  for (std::size_t i = 0; i < design.inputs.size(); ++i) {
+    double all = 0, cosines = 0, sines = 0;
+    std::size_t switches = 0;
+    for (const StepPlace& at : design.steps) {
+      const double size = std::abs(at.inputs[input_lags * i] - at.inputs[input_lags * i + 1]);
+      if (size == 0) continue;
+      const double angle = 2 * std::numbers::pi * frequency * (at.time - design.first_time);
+      ++switches;
+      all += size;
+      cosines += size * std::cos(angle);
+      sines += size * std::sin(angle);
+    }
+    if (switches >= fewest_switches && std::hypot(cosines, sines) > most_in_phase * all) return true;
+  }
+  return false;
 }
 
 // The effects in which one parameter of the machine varies.
@@ -182,8 +212,12 @@ class Varying {
       // The fastest frequency itself is left out, as rounding would decide whether the list reaches it.
       const double end = 0.999 / fastest;
       for (double f = 1 / whole; one.candidate.variants.size() < waves && f < end; f += apart)
-        one.candidate.variants.push_back({f});
+        if (!input_switches_at(design_, f)) one.candidate.variants.push_back({f});
       one.candidate.refine = {apart};
+      if (one.candidate.variants.empty()) {
+        one.candidate.variants = {{1 / whole}};
+        one.candidate.undecidable = "an input switches by the clock, at every frequency that could be told";
+      }
     } else {
       one.candidate.variants = {{1.0}};
       one.candidate.undecidable = "the runs have no clock: a time_s for every row, by one clock for all trials";
@@ -293,6 +327,72 @@ MachineCandidate lag(const Machine& machine, const MachineDesign& design, std::s
   one.apply = [input, inputs = machine.inputs.size()](MachineHypothesis& h, const Values&, const Values& v) {
     h.lag.resize(inputs);
     h.lag[input] = v[0];
+  };
+  return one;
+}
+
+// A recorded input acts through a filter of first order, as through a slow actuator.
+MachineCandidate filter(const Machine& machine, const MachineDesign& design, std::size_t input) {
+  MachineCandidate one = lag(machine, design, input);
+  one.candidate.id = "filtered_" + machine.inputs[input];
+  one.candidate.parameters = {{0, 0, longest_kept, fine_step}};
+  one.candidate.report = [](const Values&, const Values& v) {
+    return std::vector<NamedValue>{{"time_constant_steps", v[0] > 0 ? -1 / std::log(v[0]) : 0}};
+  };
+  one.candidate.form_of = [](const Values& v) { return FittedForm{{}, {v[0] > 0 ? std::exp(-1 / v[0]) : 0}}; };
+  one.apply = [input, inputs = machine.inputs.size()](MachineHypothesis& h, const Values&, const Values& v) {
+    h.filter.resize(inputs);
+    h.filter[input] = v[0];
+  };
+  return one;
+}
+
+// Returns what is kept from step to step with a time constant, given by its logarithm.
+double kept_with(double log_constant) { return std::exp(-std::exp(-log_constant)); }
+
+// The map lacks a state that follows a measured one and pushes it or another one, as the wall of a room that is heated,
+// or what hangs on a compliance. An entry of a variant is the logarithm of its time constant [steps], and a sensor.
+MachineCandidate hidden_state(const Machine& machine, std::shared_ptr<const MachineDesign> design, std::size_t sensor) {
+  MachineCandidate one;
+  one.candidate.id = "hidden_state_" + machine.observe[sensor].state;
+  double most = 1;
+  for (const double sd : design->sd)
+    if (design->sd[sensor] > 0) most = std::max(most, sd / design->sd[sensor]);
+  one.candidate.parameters = {{0, -most, most, fine_step}};
+  int longest = 0;
+  for (const StepPlace& at : design->steps) longest = std::max(longest, at.number);
+  one.candidate.variants.clear();
+  double beside = 0;
+  for (double constant = std::log(shortest_constant); constant < std::log(longest); constant += constants_apart) {
+    beside = std::max(beside, share_beside_states(*design, sensor, ahead_of(*design, sensor, kept_with(constant))));
+    for (std::size_t j = 0; j < machine.observe.size(); ++j)
+      one.candidate.variants.push_back({constant, static_cast<double>(j)});
+  }
+  one.candidate.refine = {constants_apart, 0};
+  const bool short_trials = longest < static_cast<int>(fewest_followed);
+  if (short_trials || beside < least_beside_states) {
+    one.candidate.variants = {{std::log(shortest_constant), static_cast<double>(sensor)}};
+    one.candidate.undecidable =
+        short_trials ? fmt::format("it takes trials of {} steps and more", fewest_followed)
+                     : fmt::format(
+                           "what follows {0} goes with {0} and the number of the step in these trials, so that "
+                           "whatever goes with these would be called so: it takes trials that differ more",
+                           machine.observe[sensor].state);
+  }
+  one.candidate.report = [sensors = machine.observe.size()](const Values& variant, const Values& v) {
+    std::vector<NamedValue> all{{"pull", v[0]}, {"time_constant_steps", std::exp(variant[0])}};
+    if (sensors > 1) all.emplace_back("state_number", variant[1] + 1);
+    return all;
+  };
+  one.candidate.form_of = [sensor](const Values& v) {
+    return FittedForm{{std::log(v[1]), v.size() > 2 ? v[2] - 1 : static_cast<double>(sensor)}, {v[0]}};
+  };
+  std::vector<std::size_t> states;
+  for (const MachineSensor& of : machine.observe) states.push_back(machine.state_index(of.state));
+  one.apply = [sensor, design, states](MachineHypothesis& h, const Values& variant, const Values& v) {
+    const double kept = kept_with(variant[0]);
+    h.hidden.push_back(
+        {states[sensor], states[static_cast<std::size_t>(variant[1])], kept, v[0], ahead_of(*design, sensor, kept)});
   };
   return one;
 }
@@ -435,6 +535,10 @@ std::vector<MachineCandidate> machine_effects(const Machine& machine, std::share
   }
   all.push_back(memory(machine));
   for (std::size_t i = 0; i < machine.inputs.size(); ++i) all.push_back(lag(machine, *design, i));
+  for (std::size_t i = 0; !machine.whole_state && i < machine.inputs.size(); ++i)
+    all.push_back(filter(machine, *design, i));
+  for (std::size_t j = 0; !machine.whole_state && j < machine.observe.size(); ++j)
+    all.push_back(hidden_state(machine, design, j));
   all.push_back(outliers());
   for (std::size_t j = 0; j < machine.observe.size(); ++j) all.push_back(sensor_noise(machine, *design, j));
   for (std::size_t j = 0; j < machine.observe.size(); ++j) all.push_back(sensor_bias(machine, *design, j));
@@ -464,9 +568,11 @@ std::string alternating_memory(const MachineDesign& design, std::span<const Effe
 
 std::vector<std::string> generic_effect_names(const Machine& machine) {
   std::vector<std::string> names{"memory", "outliers"};
-  for (const std::string& input : machine.inputs) names.push_back("lag_" + input);
+  for (const std::string& input : machine.inputs)
+    for (const char* of : {"lag_", "filtered_"}) names.push_back(of + input);
   for (const std::string& state : machine.states)
-    for (const char* of : {"sensor_noise_", "sensor_bias_", "launch_", "launch_spread_"}) names.push_back(of + state);
+    for (const char* of : {"hidden_state_", "sensor_noise_", "sensor_bias_", "launch_", "launch_spread_"})
+      names.push_back(of + state);
   for (const std::string& varying : machine.may_vary) {
     for (const char* how : {"_by_phase", "_drift", "_spread", "_clock", "_stretch"}) names.push_back(varying + how);
     for (const std::string& state : machine.states) names.push_back(fmt::format("{}_with_{}", varying, state));
@@ -477,7 +583,8 @@ std::vector<std::string> generic_effect_names(const Machine& machine) {
 std::string machine_effect_unit(const Machine& machine, const std::string& effect, const std::string& parameter) {
   for (const MachineEffect& suspected : machine.effects)
     if (suspected.id == effect) return machine.unit_of(parameter);
-  for (const char* plain : {"correlation", "noise_number", "share", "steps"})
+  for (const char* plain :
+       {"correlation", "noise_number", "share", "steps", "pull", "time_constant_steps", "state_number"})
     if (parameter == plain) return "";
   for (const char* place : {"frequency_hz", "from_m", "to_m"})
     if (parameter == place) return Machine{}.unit_of(parameter);

@@ -21,10 +21,11 @@ struct MachineCandidate {
 
 /// Lists the suspected effects by their ids; then, for each parameter q that may vary, q_by_phase, q_drift (over the
 /// order of runs), q_spread (from trial to trial), q_clock (a sine of time), q_stretch (of the way), q_with_STATE (for
-/// each measured state) and q_by_LABEL; then memory (of the scores), outliers (of the scores), sensor_noise_STATE and
-/// sensor_bias_STATE for each measured state, and launch_STATE and launch_spread_STATE (first values that are off, or
-/// scatter more than it is stated) for each state that is measured or whose launch is stated. Those that the runs
-/// cannot show say why.
+/// each measured state) and q_by_LABEL; then memory (of the scores), lag_INPUT and filtered_INPUT (it acts later, or
+/// through a filter of first order), hidden_state_STATE (a state that the map lacks follows a measured one and pushes a
+/// measured one), outliers (of the scores), sensor_noise_STATE and sensor_bias_STATE for each measured state, and
+/// launch_STATE and launch_spread_STATE (first values that are off, or scatter more than it is stated) for each state
+/// that is measured or whose launch is stated. Those that the runs cannot show say why.
 std::vector<MachineCandidate> machine_effects(const Machine& machine, std::shared_ptr<const MachineDesign> design);
 
 /// Says in a sentence that phases alternate from step to step as a memory below zero does, where both do; else "".

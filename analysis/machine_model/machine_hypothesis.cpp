@@ -10,7 +10,7 @@ namespace {
 bool only_adds(const MachineHypothesis& h, const MachineHypothesis& plain) {
   return h.values == plain.values && h.sensor_sd == plain.sensor_sd && h.wild == plain.wild && h.laws.empty() &&
          h.spreads.empty() && h.push_spreads.empty() && h.memory.empty() && h.added_noise.empty() && h.bias.empty() &&
-         h.launch_offset.empty() && h.launch_scatter.empty() && h.lag.empty() && h.outliers == 0;
+         h.launch_offset.empty() && h.launch_scatter.empty() && h.lag.empty() && h.filter.empty() && h.outliers == 0;
 }
 
 std::vector<double> per(double step, std::vector<double> transition) {
@@ -57,6 +57,12 @@ std::optional<Addition> addition_of(const MachineHypothesis& plain, const Machin
   for (const auto& one : changed.changes) found.push_back({one.value, per(step, one.transition)});
   for (const auto& one : changed.pushes)
     if (moves(one.transition)) found.push_back({values + one.state, per(step, one.transition)});
+  for (const auto& one : changed.hidden) {
+    if (one.pull == 0) continue;
+    std::vector<double> pushed;
+    for (const double ahead : one.ahead) pushed.push_back(one.pull * ahead);
+    found.push_back({values + one.pushes, per(step, std::move(pushed))});
+  }
   if (!changed.scatter.empty()) {
     std::vector<double> logarithms;
     for (const double one : changed.scatter) logarithms.push_back(std::log(one));

@@ -43,12 +43,21 @@ struct MachineHypothesis {
     std::vector<double> transition;  // These are the weights.
   };
 
+  /// A state that the map lacks: it follows one of the states, of which it takes on a share 1 - kept of their distance
+  /// at each step, and pushes a state by `pull` times that distance.
+  struct Hidden {
+    std::size_t follows, pushes;
+    double kept, pull;
+    std::vector<double> ahead;  // by transition: how far it is ahead of what was measured of the state it follows
+  };
+
   std::vector<double> values;  ///< parameters and the effects' parameters
   std::vector<Change> changes = {};
   std::vector<StateLaw> laws = {};
   std::vector<Spread> spreads = {};
   std::vector<Push> pushes = {};
   std::vector<PushSpread> push_spreads = {};
+  std::vector<Hidden> hidden = {};
   std::vector<double> scatter = {};         ///< by transition: scores are so many times as large; empty: 1
   std::vector<double> memory = {};          ///< by score: correlation with the one before; empty: 0
   std::vector<double> sensor_sd = {};       ///< by sensor
@@ -57,6 +66,7 @@ struct MachineHypothesis {
   std::vector<double> launch_offset = {};   ///< by state: launches are at so much more than is stated; empty: 0
   std::vector<double> launch_scatter = {};  ///< by state: sd by which they scatter beside what is stated; empty: 0
   std::vector<double> lag = {};             ///< by input [steps]: what acts is what was recorded so long before
+  std::vector<double> filter = {};          ///< by input: what acts keeps such a share of what acted the step before
   double outliers = 0;                      ///< share of steps whose scores are drawn wide
   double wild = 0;                          ///< share of rows that say nothing of the state
 

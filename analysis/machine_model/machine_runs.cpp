@@ -20,8 +20,13 @@ namespace {
 
 constexpr double trials_apart = 0.5;                         // of logarithms, of trials that start anywhere
 constexpr double trials_alike = 0.4;                         // of that factor's logarithm: spread of trials in one unit
+constexpr double next_row = 1.5;                             // gaps from a trial to one that goes on with it, at most
 constexpr double launch_off = 4;                             // standard errors: one machine in 16000 by chance
 constexpr std::size_t fewest_compared = 4, fewest_rows = 3;  // for trials to be compared; of a trial that stands still
+// Gaps between rows are uneven where this share of them is off the usual one by more than the second share. Rows are
+// missing where most of these are so near a whole multiple of it. What tells the gaps is in proportion to most of them.
+constexpr double uneven_rows = 0.1, uneven_by = 0.2, near_whole = 0.1, most_gaps = 0.8, in_proportion = 0.1;
+constexpr std::size_t fewest_gaps = 20, fewest_to_rescale = 10;  // steps, for the gaps and for the unit of an input
 // Squares of sizes beyond these overflow, or are lost in the smallest numbers: such a column is in no unit of a
 // machine.
 constexpr double smallest_span = 1e-100, largest_value = 1e100;
@@ -54,7 +59,7 @@ void require_clock(const MachineRuns& runs) {
     double latest = -std::numeric_limits<double>::infinity();
     for (const MachineRow& row : runs.trials[t].rows) {
       if (row.time < latest)
-        throw std::invalid_argument(fmt::format("time_s: it runs back in trial {}, row {}: {} comes after {}",
+        throw std::invalid_argument(fmt::format("time_s: it runs back in trial {}, row {}: {:.12g} comes after {:.12g}",
                                                 runs.name_of(t), &row - runs.trials[t].rows.data() + 1, row.time,
                                                 latest));
       if (!std::isnan(row.time)) latest = row.time;
@@ -227,6 +232,69 @@ std::vector<std::string> missing_phases(const MachineRuns& runs) {
   return {fmt::format("phase: {} of {} steps have none, and effects by phase are not sought in these", missing, steps)};
 }
 
+// The time from one row to the next.
+struct RowGap {
+  double time;
+  const MachineRow *from, *to;
+};
+
+// Says whether a value of each gap is in proportion to nearly all of them.
+template <class ValueOf>
+bool tells_gaps(const std::vector<RowGap>& gaps, ValueOf value_of) {
+  std::vector<double> ratios;
+  for (const RowGap& gap : gaps)
+    if (const double value = value_of(gap); std::isfinite(value)) ratios.push_back(value / gap.time);
+  if (ratios.empty()) return false;
+  const double usual = median(ratios);
+  const auto near = std::ranges::count_if(
+      ratios, [&](double ratio) { return std::abs(ratio - usual) < in_proportion * std::abs(usual); });
+  return static_cast<double>(near) > most_gaps * static_cast<double>(gaps.size());
+}
+
+// Says whether an input or a state tells the map how long each step lasts.
+bool knows_gaps(const Machine& machine, const std::vector<RowGap>& gaps) {
+  for (std::size_t i = 0; i < machine.inputs.size(); ++i)
+    if (tells_gaps(gaps, [&](const RowGap& gap) { return gap.from->inputs[i]; }) ||
+        tells_gaps(gaps, [&](const RowGap& gap) { return gap.to->inputs[i]; }))
+      return true;
+  for (std::size_t j = 0; j < machine.observe.size(); ++j)
+    if (tells_gaps(gaps, [&](const RowGap& gap) { return gap.from->seen[j]; }) ||
+        tells_gaps(gaps, [&](const RowGap& gap) { return gap.to->seen[j]; }) ||
+        tells_gaps(gaps, [&](const RowGap& gap) { return gap.to->seen[j] - gap.from->seen[j]; }))
+      return true;
+  return false;
+}
+
+// A map that is not told the time step takes a gap where rows are missing for one step. Steps whose durations differ
+// otherwise, as a walker's do, are no sign of that.
+std::vector<std::string> missing_rows(const Machine& machine, const MachineRuns& runs) {
+  std::vector<RowGap> gaps;
+  std::vector<double> times;
+  for (const MachineTrial& trial : runs.trials)
+    for (std::size_t k = 1; k < trial.rows.size(); ++k)
+      if (const double time = trial.rows[k].time - trial.rows[k - 1].time; time > 0) {
+        gaps.push_back({time, &trial.rows[k - 1], &trial.rows[k]});
+        times.push_back(time);
+      }
+  if (gaps.size() < fewest_gaps) return {};
+  const double usual = median(times);
+  double uneven = 0, whole = 0;
+  for (const double time : times) {
+    const double multiple = time / usual, nearest = std::round(multiple);
+    if (std::abs(multiple - 1) > uneven_by) ++uneven;
+    if (nearest > 1 && std::abs(multiple - nearest) < near_whole) ++whole;
+  }
+  if (uneven < uneven_rows * static_cast<double>(gaps.size()) || whole < most_gaps * uneven ||
+      knows_gaps(machine, gaps))
+    return {};
+  const auto [least, most] = std::ranges::minmax(times);
+  return {fmt::format(
+      "time_s: {:.0f} of {} gaps between rows are whole multiples of the usual {:.3g} s, as where rows are missing "
+      "(from {:.3g} to {:.3g} s); the step map bridges each gap in one step and does not know how long it is: an input "
+      "dt_s, the time from a row to the next, would tell it",
+      whole, gaps.size(), usual, least, most)};
+}
+
 // Looks at every column trial by trial, without the machine.
 std::vector<std::string> odd_trials(const Machine& machine, const MachineRuns& runs) {
   std::vector<std::string> states, said;
@@ -243,7 +311,7 @@ std::vector<std::string> odd_trials(const Machine& machine, const MachineRuns& r
     std::vector<double> all;
     for (const std::vector<double>& values : column.values) all.insert(all.end(), values.begin(), values.end());
     if (all.size() >= fewest_rows && stands_still(all))
-      said.push_back(fmt::format("{}: it is {} in every row: an input that is constant does not show what it does",
+      said.push_back(fmt::format("{}: it is {:.6g} in every row: an input that is constant does not show what it does",
                                  column.name, all.front()));
   }
   return said;
@@ -285,6 +353,17 @@ MachineRuns turned_round(const MachineRuns& runs, RowColumn column, std::size_t 
   return turned;
 }
 
+bool turns(const std::string& unit) {
+  return unit.empty() || unit.find("rad") != std::string::npos || unit.find("deg") != std::string::npos;
+}
+
+MachineRuns rescaled(const MachineRuns& runs, std::size_t input, double factor) {
+  MachineRuns other = runs;
+  for (MachineTrial& trial : other.trials)
+    for (MachineRow& row : trial.rows) row.inputs[input] *= factor;
+  return other;
+}
+
 MachineRuns backwards(const MachineRuns& runs) {
   MachineRuns turned = runs;
   for (MachineTrial& trial : turned.trials) {
@@ -317,7 +396,15 @@ std::vector<MisreadRuns> misread_runs(const Machine& machine, const MachineRuns&
           {name + ": with the other sign", "is its sign the other way round?", turned_round(long_ones, column, which)});
   };
   for (std::size_t j = 0; j < machine.observe.size(); ++j) add_column(machine.observe[j].state, sensor_of, j);
-  for (std::size_t i = 0; i < machine.inputs.size(); ++i) add_column(machine.inputs[i], input_of, i);
+  for (std::size_t i = 0; i < machine.inputs.size(); ++i) {
+    add_column(machine.inputs[i], input_of, i);
+    for (const UnitFactor& unit : unit_factors)
+      if (long_ones.transitions() >= fewest_to_rescale &&
+          (!unit.of_angles || turns(machine.unit_of(machine.inputs[i]))))
+        all.push_back({fmt::format("{}: with its values {:.3g} times as large", machine.inputs[i], 1 / unit.factor),
+                       fmt::format("is {} in {}?", machine.inputs[i], unit.words),
+                       rescaled(long_ones, i, 1 / unit.factor)});
+  }
   all.push_back(
       {"runs: with the rows of every trial in the opposite order", "do they run backwards?", backwards(long_ones)});
   const auto known = [](const std::vector<double>& values) {
@@ -360,6 +447,25 @@ bool MachineRuns::placed() const {
   return every_row(*this, [](const MachineRow& row) { return std::isfinite(row.position); });
 }
 
+bool goes_on(const MachineRuns& runs, std::size_t trial) {
+  if (trial == 0 || runs.trials[trial].rows.empty()) return false;
+  const std::vector<MachineRow>& before = runs.trials[trial - 1].rows;
+  if (before.size() < 2) return false;
+  const double last = before.back().time, gap = last - before[before.size() - 2].time;
+  const double here = runs.trials[trial].rows.front().time - last;
+  return here > 0 && here < next_row * gap;
+}
+
+RowPlace row_before(const MachineRuns& runs, std::size_t trial, std::size_t row, std::size_t steps) {
+  if (steps <= row) return {trial, row - steps};
+  if (!goes_on(runs, trial)) return {trial, 0};
+  const std::vector<MachineRow>& before = runs.trials[trial - 1].rows;
+  const std::size_t beyond = steps - row;
+  const auto known = [](double x) { return std::isfinite(x); };
+  const bool there = beyond <= before.size() && std::ranges::all_of(before[before.size() - beyond].inputs, known);
+  return there ? RowPlace{trial - 1, before.size() - beyond} : RowPlace{trial, 0};
+}
+
 // The sums are taken in two passes, so that a column far from zero keeps its spread.
 ColumnSpread column_spread(const MachineRuns& runs, std::size_t sensor) {
   const std::vector<double> values = column(runs, sensor);
@@ -394,7 +500,7 @@ std::vector<std::string> look_over(const Machine& machine, const MachineRuns& ru
                       values.empty() ? "no value in any row" : "one value; every other row lacks it"));
     const auto [least, most] = std::ranges::minmax(values);
     if (least == most)
-      throw std::invalid_argument(fmt::format("runs: {} is {} in every row: a column that is constant says nothing",
+      throw std::invalid_argument(fmt::format("runs: {} is {:.6g} in every row: a column that is constant says nothing",
                                               machine.observe[j].state, least));
     if (most - least < smallest_span || std::max(std::abs(least), std::abs(most)) > largest_value)
       throw std::invalid_argument(
@@ -406,7 +512,7 @@ std::vector<std::string> look_over(const Machine& machine, const MachineRuns& ru
   const MapAsked map = ask_map(machine, runs);
   for (const std::vector<std::string>& sentences :
        {map.idle_noise, doubled_trials(runs), map.other_units, odd_trials(machine, runs), other_launches(machine, runs),
-        missing_phases(runs)})
+        missing_phases(runs), missing_rows(machine, runs)})
     said.insert(said.end(), sentences.begin(), sentences.end());
   return said;
 }

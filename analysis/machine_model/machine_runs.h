@@ -52,6 +52,17 @@ struct MachineRuns {
   std::string name_of(std::size_t trial) const;  ///< for messages: MachineTrial::name, or its number
 };
 
+/// Says whether a trial begins a step after the one before it ended, by a clock that goes on: one run was cut there.
+bool goes_on(const MachineRuns& runs, std::size_t trial);
+
+/// The place of a row.
+struct RowPlace {
+  std::size_t trial, row;
+};
+/// Returns where an input is found that was recorded some rows before a row: in its trial, in the trial before where
+/// the trial goes on with that, else in its first row.
+RowPlace row_before(const MachineRuns& runs, std::size_t trial, std::size_t row, std::size_t steps);
+
 /// The mean and the standard deviation of the values that a sensor has in all rows; mean 0 and sd 1 without a value.
 struct ColumnSpread {
   double mean = 0, sd = 1;
@@ -69,13 +80,15 @@ struct MisreadRuns {
 };
 
 /// Returns the runs with each sensor and each input one row later and one row earlier, with its sign the other way
-/// round where it has both, and with the rows of every trial in the opposite order. Rows that are left without a value
-/// go, and trials do that have fewer than three rows, or lack a state in the first of them or an input before the last.
+/// round where it has both, with each input in another unit, and with the rows of every trial in the opposite order.
+/// Rows that are left without a value go, and trials do that have fewer than three rows, or lack a state in the first
+/// of them or an input before the last.
 std::vector<MisreadRuns> misread_runs(const Machine& machine, const MachineRuns& runs);
 
 /// Lists in sentences the signs that the runs are not this machine's: columns in other units, in all trials or in some;
 /// a column that is constant in some trials, an input that is in all; trials that are there twice; first rows whose
-/// mean is four standard errors and more off the launch that is stated; steps without a phase.
+/// mean is four standard errors and more off the launch that is stated; steps without a phase; rows that are missing
+/// where the step is not told of the gaps.
 /// @throws std::invalid_argument where they do not fit the machine: no transition, fewer rows than parameters, rows of
 ///   another shape, time that runs back within a trial, a label "machine" with two values, a state that is constant, a
 ///   first row that lacks a state without launch; where the map makes something else of the same rows when it is asked

@@ -58,8 +58,9 @@ double wild_width(const Draws& draws, std::size_t row) {
 
 // A trial under way.
 struct Walking {
-  Eigen::VectorXd point;   // as MachineStepper's
-  Eigen::VectorXd errors;  // by sensor: of this row
+  Eigen::VectorXd point;       // as MachineStepper's
+  Eigen::VectorXd errors;      // by sensor: of this row
+  std::vector<double> hidden;  // states that the map lacks
   bool over = false;
 };
 
@@ -69,6 +70,11 @@ MachineRuns all_trials(std::span<const MachineRuns> experiments) {
   for (const MachineRuns& one : experiments.subspan(1))
     all.trials.insert(all.trials.end(), one.trials.begin(), one.trials.end());
   return all;
+}
+
+MachineHypothesis without_hidden(MachineHypothesis h) {
+  h.hidden.clear();
+  return h;
 }
 
 // Walks the trials of experiments that differ in their launches, all together.
@@ -82,7 +88,8 @@ class Walker {
         seeds_(seeds),
         launches_(launches),
         each_(experiments.front().trials.size()),
-        stepper_(machine, runs_, supposed) {
+        seen_alone_(without_hidden(supposed)),
+        stepper_(machine, runs_, seen_alone_) {
     for (const MachineRuns& one : experiments) designs_.push_back(machine_design(machine, one));
   }
   std::vector<MachineRuns> walk();
@@ -94,6 +101,7 @@ class Walker {
   bool drawn_launch(std::size_t sensor, const MachineRow& row) const;
   double error(std::size_t sensor, double now, double before) const;
   MachineRow seen(std::size_t trial, std::size_t row, Walking& walking) const;
+  void carry(Walking& walking, const Eigen::Ref<const Eigen::VectorXd>& next) const;
   std::vector<MachineRuns> apart(MachineRuns all) const;
   Draws draws_of(std::size_t trial) const { return {seeds_[trial / each_], trial % each_}; }
 
@@ -102,7 +110,8 @@ class Walker {
   const MachineHypothesis& supposed_;
   std::span<const std::uint64_t> seeds_;  // by experiment
   Launches launches_;
-  std::size_t each_;  // trials of an experiment
+  std::size_t each_;              // trials of an experiment
+  MachineHypothesis seen_alone_;  // what is supposed but for hidden states, which are carried along
   MachineStepper stepper_;
   std::vector<MachineDesign> designs_;  // by experiment
 };
@@ -135,7 +144,9 @@ Walking Walker::launched(std::size_t trial, MachineRow& first) const {
   const MachineRow& row = runs_.trials[trial].rows.front();
   const bool is_wild = draws.uniform(0, wild) < supposed_.wild;
   Walking walking{Eigen::VectorXd::Zero(static_cast<Eigen::Index>(stepper_.size())),
-                  Eigen::VectorXd::Zero(static_cast<Eigen::Index>(machine_.observe.size())), false};
+                  Eigen::VectorXd::Zero(static_cast<Eigen::Index>(machine_.observe.size())),
+                  {},
+                  false};
   for (std::size_t l = 0; l < machine_.launches.size(); ++l) {
     const std::size_t s = machine_.state_index(machine_.launches[l].state);
     const NormalLaunch at = supposed_launch(supposed_, machine_.launches[l], s);
@@ -192,6 +203,18 @@ MachineRow Walker::seen(std::size_t trial, std::size_t row, Walking& walking) co
   return out;
 }
 
+// Takes a trial to its next state, and the states that the map lacks to theirs.
+void Walker::carry(Walking& walking, const Eigen::Ref<const Eigen::VectorXd>& next) const {
+  const Eigen::VectorXd from = walking.point;
+  walking.point.head(next.size()) = next;
+  for (std::size_t i = 0; i < supposed_.hidden.size(); ++i) {
+    const MachineHypothesis::Hidden& one = supposed_.hidden[i];
+    const double ahead = walking.hidden[i] - from[static_cast<Eigen::Index>(one.follows)];
+    walking.point[static_cast<Eigen::Index>(one.pushes)] += one.pull * ahead;
+    walking.hidden[i] -= (1 - one.kept) * ahead;
+  }
+}
+
 std::vector<MachineRuns> Walker::walk() {
   MachineRuns out = runs_;
   std::vector<Walking> walking;
@@ -202,10 +225,13 @@ std::vector<MachineRuns> Walker::walk() {
     first.push_back(number);
     number += steps_of(runs_.trials[t]);
     if (runs_.trials[t].rows.empty()) {
-      walking.push_back({{}, {}, true});
+      walking.push_back({{}, {}, {}, true});
       continue;
     }
     walking.push_back(launched(t, out.trials[t].rows.front()));
+    for (const MachineHypothesis::Hidden& one : supposed_.hidden)
+      walking.back().hidden.push_back(walking.back().point[static_cast<Eigen::Index>(one.follows)] +
+                                      (first[t] < one.ahead.size() ? one.ahead[first[t]] : 0));
     out.trials[t].rows.resize(1);
     if (out.trials[t].outcome == MachineOutcome::failed) out.trials[t].outcome = MachineOutcome::stopped;
   }
@@ -237,7 +263,7 @@ std::vector<MachineRuns> Walker::walk() {
         out.trials[who[i]].outcome = MachineOutcome::failed;
         continue;
       }
-      one.point.head(static_cast<Eigen::Index>(stepper_.states())) = stepper_.next(i);
+      carry(one, stepper_.next(i));
       out.trials[who[i]].rows.push_back(seen(who[i], k + 1, one));
     }
   }

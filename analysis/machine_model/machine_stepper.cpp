@@ -10,15 +10,6 @@ namespace {
 
 constexpr std::uint8_t lost_mark = 2;  // it did not fail, and there is no next state
 
-// Returns an input as it was recorded `lag` steps before a row; between two rows it goes in a straight line. Before the
-// trial it is taken to be what the first row has.
-double lagged_input(const MachineTrial& trial, std::size_t row, std::size_t input, double lag) {
-  const auto before = [&](std::size_t steps) { return trial.rows[row > steps ? row - steps : 0].inputs[input]; };
-  const auto whole = static_cast<std::size_t>(lag);
-  const double rest = lag - static_cast<double>(whole);
-  return rest > 0 ? (1 - rest) * before(whole) + rest * before(whole + 1) : before(whole);
-}
-
 }  // namespace
 
 MachineStepper::MachineStepper(const Machine& machine, const MachineRuns& runs, const MachineHypothesis& supposed)
@@ -37,6 +28,44 @@ MachineStepper::MachineStepper(const Machine& machine, const MachineRuns& runs, 
   for (const auto& one : supposed.laws) varies_[one.value] = 1;
   for (const auto& one : supposed.spreads) varies_[one.value] = 1;
   values_.resize(lower_.size() + machine.inputs.size());
+  std::size_t rows = 0;
+  for (const MachineTrial& trial : runs.trials) {
+    first_row_.push_back(rows);
+    rows += trial.rows.size();
+  }
+  for (std::size_t i = 0; i < machine.inputs.size(); ++i) {
+    const bool filters = !supposed.filter.empty() && supposed.filter[i] > 0;
+    filtered_.push_back(filters ? acting(i) : std::vector<double>{});
+  }
+}
+
+// Returns what acts of an input that is filtered, by row. A trial begins with what its first row has.
+std::vector<double> MachineStepper::acting(std::size_t input) const {
+  const double kept = supposed_.filter[input];
+  std::vector<double> acts;
+  for (std::size_t t = 0; t < runs_.trials.size(); ++t) {
+    const bool on = goes_on(runs_, t);
+    for (const MachineRow& row : runs_.trials[t].rows) {
+      const bool first = &row == &runs_.trials[t].rows.front();
+      const double before = first && !on ? row.inputs[input] : acts.back(), here = row.inputs[input];
+      acts.push_back(std::isfinite(here) ? kept * before + (1 - kept) * here : before);  // A last row may have none.
+    }
+  }
+  return acts;
+}
+
+// Returns an input as it acted `lag` steps before a row; between two rows it goes in a straight line. Before the trial
+// it is taken to be what the first row has, unless the trial goes on with the one before.
+double MachineStepper::input_at(std::size_t input, const TransitionPlace& place) const {
+  const double lag = supposed_.lag.empty() ? 0 : supposed_.lag[input];
+  const auto before = [&](std::size_t steps) {
+    const RowPlace at = row_before(runs_, place.trial, place.row, steps);
+    return filtered_[input].empty() ? runs_.trials[at.trial].rows[at.row].inputs[input]
+                                    : filtered_[input][first_row_[at.trial] + at.row];
+  };
+  const auto whole = static_cast<std::size_t>(lag);
+  const double rest = lag - static_cast<double>(whole);
+  return rest > 0 ? (1 - rest) * before(whole) + rest * before(whole + 1) : before(whole);
 }
 
 void MachineStepper::clear() {
@@ -108,9 +137,7 @@ void MachineStepper::add_straight(const TransitionPlace& place, const Eigen::Ref
                       point[static_cast<Eigen::Index>(states() + value_offsets() + i)]);
   for (std::size_t v = 0; v < lower_.size(); ++v)
     if (varies_[v]) values_[v].push_back(value_at(v, place, point));
-  for (std::size_t i = 0; i < machine_.inputs.size(); ++i)
-    values_[lower_.size() + i].push_back(
-        lagged_input(runs_.trials[place.trial], place.row, i, supposed_.lag.empty() ? 0 : supposed_.lag[i]));
+  for (std::size_t i = 0; i < machine_.inputs.size(); ++i) values_[lower_.size() + i].push_back(input_at(i, place));
 }
 
 // Stores what the map returned for a point, with the pushes added.
@@ -121,6 +148,8 @@ void MachineStepper::take(std::size_t point, std::span<const double> next, std::
   if (!std::ranges::all_of(next, [](double x) { return std::isfinite(x); })) failed_[point] = lost_mark;
   for (const auto& push : supposed_.pushes)
     next_[point * states() + push.state] += push.transition[places_[point].number];
+  for (const auto& one : supposed_.hidden)
+    next_[point * states() + one.pushes] += one.pull * one.ahead[places_[point].number];
   const std::size_t count = supposed_.push_spreads.size();
   for (std::size_t i = 0; i < count; ++i)
     next_[point * states() + supposed_.push_spreads[i].state] += pushed_[point * count + i];

@@ -72,14 +72,18 @@ class MachineStepper {
   void add_straight(const TransitionPlace& place, const Eigen::Ref<const Eigen::VectorXd>& point,
                     const Eigen::Ref<const Eigen::VectorXd>& fresh);
   void take(std::size_t point, std::span<const double> next, std::uint8_t failed);
+  std::vector<double> acting(std::size_t input) const;
+  double input_at(std::size_t input, const TransitionPlace& place) const;
   double value_at(std::size_t value, const TransitionPlace& place,
                   const Eigen::Ref<const Eigen::VectorXd>& point) const;
 
   const Machine& machine_;
   const MachineRuns& runs_;
   const MachineHypothesis& supposed_;
-  std::vector<double> lower_, upper_;  // of the values
-  std::vector<char> varies_;           // by value: differs from row to row
+  std::vector<double> lower_, upper_;          // of the values
+  std::vector<char> varies_;                   // by value: differs from row to row
+  std::vector<std::vector<double>> filtered_;  // by input, of all rows in their order; empty: as it was recorded
+  std::vector<std::size_t> first_row_;         // by trial, among all rows
   std::vector<double> states_, scores_, next_;
   std::vector<double> pushed_;               // by point and PushSpread: what its state is pushed by
   std::vector<std::vector<double>> values_;  // by value

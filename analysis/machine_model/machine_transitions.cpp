@@ -17,6 +17,7 @@
 #include "analysis/fitting/latest_evaluations.h"
 #include "analysis/fitting/model_fit.h"
 #include "analysis/fitting/rules.h"
+#include "analysis/machine_model/asked_map.h"
 #include "analysis/machine_model/machine_design.h"
 #include "analysis/machine_model/machine_effects.h"
 #include "analysis/machine_model/machine_filter.h"
@@ -40,7 +41,6 @@ constexpr double parameter_step = 1e-3;  // of the sd with which it is known, fo
 // A parameter is refitted within so many of its sds, or within this share of its nominal value where that is wider.
 constexpr double widest_refit = 20, widest_share = 0.5;
 constexpr double seen_share = 1e-6;  // of a column's change, that its noise or its error must exceed
-
 // A recalibration may leave what is stated of a parameter behind. So many stated parameters are known less well than it
 // is stated: an assumption, that of the wheel's contact. Physicists have done worse: of intervals that were to hold 98
 // % of physical constants, later measurements left 9 to 57 % (Henrion and Fischhoff 1986, Am. J. Phys. 54, 791).
@@ -54,14 +54,12 @@ constexpr double chance_sds = 2;   // So far from its mean chance takes what n n
 
 // Failures foretold in the steps recorded, for trials that end early to be asked about: none comes in one set of 150.
 constexpr double foretold_failures = 5;
-
 // A misread column fits better by so many nats a value, a normal error's tenth, and by so many in all, beyond chance.
 constexpr double misread_nats = 0.1, misread_nats_in_all = 30;
 constexpr std::size_t enough_to_suspect = 500;  // steps in which it is looked for
 constexpr double few_failures = 10;             // counted ones, that say next to nothing of the expected steps
 
 bool is_outliers(const EffectTerm& term) { return term.candidate->id == "outliers"; }
-
 double share_of(double logit) { return 1 / (1 + std::exp(-logit)); }
 
 class MachineTransitions : public TransitionModel {
@@ -184,7 +182,6 @@ class MachineTransitions : public TransitionModel {
   std::vector<NamedValue> report_nuisances(std::span<const double> nuisance) const override;
   std::vector<std::string> misstated(const Fit& fitted) const override;
   void require_own_draws(const Fit& recalibrated) const override;
-
   std::unique_ptr<MachineTransitions> with_wide_priors() const;
   bool effect_speaks_for_what_is_stated(const Fit& recalibrated, const Fit& wide) const;
   void set_aside_what_is_misstated(const Fit& recalibrated);
@@ -368,15 +365,12 @@ std::vector<NamedValue> MachineTransitions::report_nuisances(std::span<const dou
 
 double sds_off(const Nuisance& stated, double value) { return std::abs(value - stated.nominal) / stated.prior_sd; }
 
-// Lists the parameters that are far from what is stated of them, by their slots: those of which that was set aside;
-// beside effects, which may hold a parameter there, any.
-std::vector<std::size_t> misstated_slots(const TransitionModel& model, const std::vector<double>& nuisance,
-                                         bool beside_effects = false) {
+// Lists the parameters that are far from what is stated of them, by their slots.
+std::vector<std::size_t> misstated_slots(const TransitionModel& model, const std::vector<double>& nuisance) {
   std::vector<std::size_t> all;
   for (std::size_t slot = 0; slot < nuisance.size(); ++slot)
     if (const Nuisance& one = model.nuisances()[slot];
-        (one.misstated > 0 || (beside_effects && !one.assumed && one.name != wild_name)) &&
-        sds_off(one, nuisance[slot]) > misstated_sds)
+        !one.assumed && one.name != wild_name && sds_off(one, nuisance[slot]) > misstated_sds)
       all.push_back(slot);
   return all;
 }
@@ -420,12 +414,9 @@ void MachineTransitions::set_aside_what_is_misstated(const Fit& recalibrated) {
   if (!(strain > strained_sds)) return;
   const auto loose = with_wide_priors();
   Fit wide = fit(*loose, recalibrated.nuisance, {});
-  // The stated values may be too far off for steps from there to find the way; those of a strained fit may lead
-  // elsewhere.
-  FitOptions from_stated;
-  from_stated.to_beat = wide.penalised;
-  if (Fit other = fit(*loose, nominal_values(*loose), {}, from_stated); other.penalised > wide.penalised)
-    wide = std::move(other);
+  // Steps from stated values that are far off may not find the way; those from a strained fit may lead elsewhere.
+  Fit other = fit(*loose, nominal_values(*loose), {}, {.count = {}, .to_beat = wide.penalised});
+  if (other.penalised > wide.penalised) wide = std::move(other);
   const std::vector<std::size_t> slots = misstated_slots(*loose, wide.nuisance);
   if (slots.empty() || effect_speaks_for_what_is_stated(recalibrated, wide)) return;
   for (const std::size_t one : slots) nuisances_[one].misstated = 1;
@@ -454,10 +445,16 @@ double MachineTransitions::mean_log_density(const Evaluation& evaluation) const 
   return count > 0 ? sum / count : -std::numeric_limits<double>::infinity();
 }
 
-// A column that was misread passes for effects, and for parameters that are far off. A part of the trials shows it.
+bool of_unit(const MisreadRuns& read) { return read.change.ends_with("times as large"); }
+
+// A column that was misread passes for effects, and for parameters that are far off. A part of the trials shows it. An
+// input in another unit makes a state look as if it were: it is sought where a state is asked about.
 void MachineTransitions::ask_for_misread_columns(const Fit& recalibrated) try {
   const double here = mean_log_density(recalibrated.evaluation);
-  const std::vector<MisreadRuns> parts = misread_runs(*machine_, thinned(runs_, enough_to_suspect));
+  const auto unit = std::ranges::find_if(
+      notes_, [](const std::string& note) { return note.find("what the machine makes of the rows") != note.npos; });
+  std::vector<MisreadRuns> parts = misread_runs(*machine_, thinned(runs_, enough_to_suspect));
+  if (unit == notes_.end()) std::erase_if(parts, of_unit);
   const std::vector<double> starts[]{nominal_values(*this), recalibrated.nuisance};
   std::vector<double> there(2 * parts.size());
   side_by_side(there.size(), 1, [&](std::size_t i) {
@@ -471,7 +468,13 @@ void MachineTransitions::ask_for_misread_columns(const Fit& recalibrated) try {
   const auto model = with_runs(read.runs);
   const double gain = model->mean_log_density(fit(*model, starts[best % 2], {}).evaluation) - here;
   const auto values = static_cast<double>(std::ranges::count(events_, EventKind::step, &Event::kind));
-  if (gain > std::max(misread_nats, misread_nats_in_all / values))  // It may settle other questions.
+  if (!(gain > std::max(misread_nats, misread_nats_in_all / values))) return;
+  // A reading under which a state still seems to be in another unit explains nothing.
+  if (unit != notes_.end() && !ask_map(*machine_, read.runs).other_units.empty()) return;
+  for (std::size_t i = 0; i < parts.size(); ++i)
+    if (of_unit(parts[i]) && std::max(there[2 * i], there[2 * i + 1]) > there[best] - misread_nats)
+      unit->replace(unit->size() - 1, 1, ", or " + parts[i].question);
+  if (!of_unit(read))  // It may settle other questions.
     notes_.insert(notes_.begin(),
                   fmt::format("{} the model fits by {:.2g} nats a value better: {}", read.change, gain, read.question));
 } catch (const std::invalid_argument&) {  // The map need not be defined where no row was measured.
@@ -545,7 +548,7 @@ bool MachineTransitions::only_wild_rows(const Fit& recalibrated) const {
 }
 
 std::vector<std::string> MachineTransitions::misstated(const Fit& fitted) const {
-  const std::vector<std::size_t> slots = misstated_slots(*this, fitted.nuisance, !fitted.terms.empty());
+  const std::vector<std::size_t> slots = misstated_slots(*this, fitted.nuisance);
   if (fitted.terms.empty() && slots.empty() && only_wild_rows(fitted))
     return {fmt::format(
         "Nothing but the share of wild rows, {:.2g}, differs from the model as given by more than chance may make it.",
@@ -561,16 +564,13 @@ std::vector<std::string> MachineTransitions::misstated(const Fit& fitted) const 
                               stated.name, value, value - half, value + half, sds_off(stated, value), stated.nominal,
                               value * stated.nominal < 0 ? ", with the other sign" : ""));
   }
-  if (!fitted.terms.empty())
-    return {
-        fmt::format("With what is named, {}: known less well than stated, unless a unit, a sign or a clock is wrong.",
-                    fmt::join(far, "; "))};
-  const std::vector<std::string> other = effects_instead(fitted);
-  return {fmt::format("{}: known less well than stated{}.", fmt::join(far, "; "),
-                      other.empty()
-                          ? ""
-                          : fmt::format(", unless an effect is at work that these data do not tell from it: {}",
-                                        fmt::join(other, ", ")))};
+  const bool alone = fitted.terms.empty();
+  const std::vector<std::string> other = alone ? effects_instead(fitted) : std::vector<std::string>{};
+  return {fmt::format("{}{}: known less well than stated, unless {}{}.", alone ? "" : "With what is named, ",
+                      fmt::join(far, "; "),
+                      other.empty() ? "a unit, a sign or a clock is wrong"
+                                    : "an effect is at work that these data do not tell from it: ",
+                      fmt::join(other, ", "))};
 }
 
 }  // namespace

@@ -80,6 +80,7 @@ Machine walker_machine(const WalkerStatement& statement) {
       {"slope_deg", setting.slope_deg, statement.slope_known_deg, 0, 45},
       {"slope_sd_deg", roughness, statement.roughness_known_deg.value_or(roughness), 1e-4 * roughness, 45}};
   machine.may_vary = {"slope_deg"};
+  machine.whole_state = true;
   // Bounds of the compass in units of its own: 5 N m s/rad stops its swing leg within a step.
   machine.effects = {{"hip_damping", {{"damping", 0, 0, compass ? 5.0 : 2.0}}},
                      {"hip_dry_friction", {{"torque", 0, 0, compass ? 5.0 : 0.5}}},

@@ -4,10 +4,12 @@
 #include <condition_variable>
 #include <exception>
 #include <map>
+#include <memory>
 #include <mutex>
 #include <thread>
 #include <vector>
 
+#include "markov/fiber.h"
 #include "markov/parallel.h"
 
 namespace metastable::markov {
@@ -20,14 +22,19 @@ class Joining {
  public:
   Joining(const BatchMap& map, std::size_t count, std::size_t together, int threads,
           const std::function<void(std::size_t, const BatchMap&)>& work)
-      : map_(map), count_(count), side_by_side_(std::min(together, count)), most_(thread_count(threads)), work_(work) {}
+      : map_(map),
+        count_(count),
+        side_by_side_(std::min(together, count)),
+        carriers_(std::min(static_cast<std::size_t>(thread_count(threads)), side_by_side_)),
+        work_(work) {}
 
   void run() {
     active_ = side_by_side_;
     next_ = side_by_side_;
     {
       std::vector<std::jthread> threads;
-      for (std::size_t slot = 0; slot < side_by_side_; ++slot) threads.emplace_back([this, slot] { serve(slot); });
+      for (std::size_t c = 1; c < carriers_; ++c) threads.emplace_back([this, c] { carry(c); });
+      carry(0);
     }
     if (!errors_.empty()) std::rethrow_exception(errors_.begin()->second);
   }
@@ -38,52 +45,62 @@ class Joining {
     std::span<const double> states, scores;
     std::span<double> next;
     std::span<std::uint8_t> failed;
-    bool answered = false;
     std::exception_ptr error = {};
   };
 
+  /// Runs every carriers_-th of the works that are side by side, each as far as it goes, and then waits for the call.
+  void carry(std::size_t first) {
+    std::vector<std::unique_ptr<Fiber>> own;
+    for (std::size_t i = first; i < side_by_side_; i += carriers_)
+      own.push_back(std::make_unique<Fiber>([this, i] { serve(i); }));
+    for (std::size_t seen = 0; !own.empty();) {
+      for (const std::unique_ptr<Fiber>& one : own) one->resume();
+      std::erase_if(own, [](const std::unique_ptr<Fiber>& one) { return one->over(); });
+      std::unique_lock lock(mutex_);
+      step_if_all_wait();
+      if (rounds_ != seen) {
+        seen = rounds_;
+        lock.unlock();
+        changed_.notify_all();  // The lock is free, so that nobody wakes to wait for it.
+        continue;
+      }
+      if (!own.empty()) changed_.wait(lock, [&] { return rounds_ != seen; });
+      seen = rounds_;
+    }
+  }
+
   void serve(std::size_t i) {
-    begin_computing();
     while (i < count_) {
       try {
         BatchMap joined = map_;
         joined.step = [this, i](int phase, auto states, auto scores, auto next, auto failed) {
           ask(i, {phase, states, scores, next, failed});
         };
+        Fiber::local() = &joined;
         work_(i, joined);
       } catch (const Abandoned&) {
       } catch (...) {
         const std::lock_guard lock(mutex_);
         errors_.emplace(i, std::current_exception());
       }
+      Fiber::local() = nullptr;
       const std::lock_guard lock(mutex_);
       i = errors_.empty() ? next_++ : count_;
     }
     const std::lock_guard lock(mutex_);
-    --computing_;
     --active_;
-    step_if_all_wait();
-    changed_.notify_all();
-  }
-
-  void begin_computing() {
-    std::unique_lock lock(mutex_);
-    changed_.wait(lock, [&] { return computing_ < most_; });
-    ++computing_;
   }
 
   void ask(std::size_t i, Request request) {
-    std::unique_lock lock(mutex_);
-    waiting_[i] = &request;
-    --computing_;
-    step_if_all_wait();
-    changed_.notify_all();
-    changed_.wait(lock, [&] { return request.answered && computing_ < most_; });
-    ++computing_;
+    {
+      const std::lock_guard lock(mutex_);
+      waiting_[i] = &request;
+    }
+    Fiber::pause();
     if (request.error) std::rethrow_exception(request.error);
   }
 
-  /// Makes the joined call once all wait. The caller holds the lock, which those that wait need only when answered.
+  /// Makes the joined call once all wait. The caller holds the lock.
   void step_if_all_wait() {
     if (waiting_.empty() || waiting_.size() < active_) return;
     try {
@@ -94,8 +111,8 @@ class Joining {
     } catch (...) {
       for (const auto& [i, request] : waiting_) request->error = std::current_exception();
     }
-    for (const auto& [i, request] : waiting_) request->answered = true;
     waiting_.clear();
+    ++rounds_;
   }
 
   void step(int phase, const std::vector<Request*>& requests) const {
@@ -127,14 +144,13 @@ class Joining {
 
   const BatchMap& map_;
   std::size_t count_, side_by_side_;
-  int most_;  ///< that compute at the same time
+  std::size_t carriers_;  ///< threads that compute at the same time
   const std::function<void(std::size_t, const BatchMap&)>& work_;
   std::mutex mutex_;
   std::condition_variable changed_;
   std::map<std::size_t, Request*> waiting_;
   std::map<std::size_t, std::exception_ptr> errors_;
-  std::size_t active_ = 0, next_ = 0;
-  int computing_ = 0;
+  std::size_t active_ = 0, next_ = 0, rounds_ = 0;
 };
 
 }  // namespace
@@ -143,5 +159,7 @@ void joined_for(const BatchMap& map, std::size_t count, std::size_t together, in
                 const std::function<void(std::size_t, const BatchMap&)>& work) {
   if (count > 0) Joining(map, count, std::max<std::size_t>(1, together), threads, work).run();
 }
+
+const BatchMap* joined_map() { return static_cast<const BatchMap*>(Fiber::local()); }
 
 }  // namespace metastable::markov

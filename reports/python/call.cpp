@@ -53,9 +53,11 @@ void Call::run(const std::function<void()>& work) {
     }
     serve(asked);
     if (asked == nullptr) continue;
-    const std::lock_guard lock(mutex_);
-    asked->done = true;
-    for_work_.notify_all();
+    {
+      const std::lock_guard lock(mutex_);
+      asked->done = true;
+    }
+    for_work_.notify_all();  // The lock is free, so that nobody wakes to wait for it.
   }
   thread.join();
   if (raised_) std::rethrow_exception(raised_);
@@ -105,7 +107,9 @@ void Call::ask(const std::function<void()>& python) {
   std::unique_lock lock(mutex_);
   if (stopped_) throw Stopped();
   asked_.push_back(&asked);
+  lock.unlock();
   for_caller_.notify_one();
+  lock.lock();
   for_work_.wait(lock, [&] { return asked.done; });
   if (stopped_) throw Stopped();
 }

@@ -182,7 +182,7 @@ TEST(Diagnosis, APairThatGainsOnlyTogetherDoesNotExplain) {
   EXPECT_EQ(d.verdict, Verdict::unexplained);
   EXPECT_TRUE(d.causes.set.empty());
   ASSERT_GE(d.sentences.size(), 2U);
-  EXPECT_NE(d.sentences[1].find("as much together as alone"), std::string::npos) << d.sentences[1];
+  EXPECT_NE(d.sentences[1].find("times as much as they do one by one"), std::string::npos) << d.sentences[1];
 }
 
 // The same beside a slope that is misread. In the place of one of the two effects such a scatter is hardly likelier
@@ -200,8 +200,8 @@ TEST(Diagnosis, OneVariationStandsInThePlaceOfTwoEffects) {
     if (one.probability >= options.rules.least_at_work) names.push_back(one.name);
   EXPECT_EQ(names, std::vector<std::string>{"slope_offset"});
   EXPECT_EQ(d.verdict, Verdict::partly_explained);
-  // The share without a name is that which the two close, and more than the best model leaves. With the slope's share it
-  // is about the whole.
+  // The share without a name is that which the two close, and more than the best model leaves. With the slope's share
+  // it is about the whole.
   EXPECT_EQ(d.causes.stand_ins.size(), 2U);
   ASSERT_TRUE(d.causes.unnamed_share && d.causes.at_work.front().closes_beside);
   EXPECT_GT(*d.causes.unnamed_share, 2 * (1 - *d.shrinkage.measures.front().closed));

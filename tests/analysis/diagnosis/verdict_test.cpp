@@ -170,8 +170,8 @@ TEST(Verdict, PairsAreAlikeWhereWhatTheyDoNotShareIs) {
             (std::vector<std::string>{"trial_drift+inertia", "slope_offset+trial_drift"}));
   EXPECT_TRUE(with_pairs(0.8).causes.alike.empty());
   EXPECT_EQ(sentences(with_pairs(0.99)).front(),
-            "There is a gap that recalibration does not remove. These data cannot tell 3 causes apart: alike in these "
-            "trials beside trial_drift (inertia, slope_offset), trial_drift+bounce.");
+            "There is a gap that recalibration does not remove. These data cannot tell 3 causes apart: inertia or "
+            "slope_offset (alike in these trials) beside trial_drift, trial_drift+bounce.");
 }
 
 // Where something without a name stays only effects that the field calls by one name stand together: a torque is at

@@ -204,21 +204,45 @@ TEST(MachineAnswers, NameAnInputThatActsLate) {
   };
   constexpr std::size_t trials = 30, rows = 15;
   const auto command = [](std::size_t t, std::size_t k) { return std::sin(1.3 * static_cast<double>(t * t + k)); };
-  for (const std::size_t late : {0U, 1U}) {
+  for (const std::string cause : {"", "lag_command", "filtered_command"}) {
     std::size_t step = 0;
+    double acts = 0;
     const auto next = [&](double x, double z, std::size_t t) {
-      const std::size_t k = step++ % (rows - 1);
-      return 0.7 * x + 0.5 * command(t, k > late ? k - late : 0) + 0.1 * z;
+      const std::size_t k = step++ % (rows - 1), late = cause == "lag_command" ? 1 : 0;
+      const double given = command(t, k > late ? k - late : 0);
+      acts = k == 0 || cause != "filtered_command" ? given : 0.6 * acts + 0.4 * given;
+      return 0.7 * x + 0.5 * acts + 0.1 * z;
     };
     MachineRuns runs = scalar_runs(trials, rows, 0, 0.05, 3, next);
     for (std::size_t t = 0; t < trials; ++t)
       for (std::size_t k = 0; k < rows; ++k) runs.trials[t].rows[k].inputs = {command(t, k)};
     const Diagnosis d = answer_to(machine, std::move(runs), {});
-    ASSERT_EQ(d.verdict, late ? Verdict::explained : Verdict::no_gap) << told(d);
-    if (late) {
-      EXPECT_EQ(d.causes.set, std::vector<std::string>{"lag_command"}) << told(d);
-      EXPECT_NEAR(d.causes.ranked.front().parameters[0][0].value, 1, 0.05);
+    ASSERT_EQ(d.verdict, cause.empty() ? Verdict::no_gap : Verdict::explained) << told(d);
+    if (cause.empty()) continue;
+    EXPECT_EQ(d.causes.set, std::vector<std::string>{cause}) << told(d);
+    EXPECT_NEAR(d.causes.ranked.front().parameters[0][0].value, cause == "lag_command" ? 1 : -1 / std::log(0.6), 0.25);
+  }
+}
+
+// A plate that a wall draws back, which follows it: 19.5 steps of time constant.
+TEST(MachineAnswers, NameAStateThatTheMapLacks) {
+  Machine machine = linear_machine(0.02);
+  for (const bool walled : {false, true}) {
+    double wall = 0, before = 0;
+    std::size_t step = 0;
+    const auto next = [&](double x, double z, std::size_t) {
+      wall = step++ % 39 == 0 ? x : wall + 0.05 * (before - wall);
+      before = x;
+      return 0.8 * x + 0.3 + 0.2 * z + (walled ? 0.15 * (wall - x) : 0);
+    };
+    const Diagnosis d = answer_to(machine, scalar_runs(60, 40, 6, 0.02, 3, next), {});
+    if (!walled) {
+      EXPECT_NE(d.verdict, Verdict::explained) << told(d);
+      continue;
     }
+    ASSERT_EQ(d.causes.set, std::vector<std::string>{"hidden_state_x"}) << told(d);
+    EXPECT_NEAR(d.causes.ranked.front().parameters[0][0].value, 0.15, 0.02);
+    EXPECT_NEAR(d.causes.ranked.front().parameters[0][1].value, 19.5, 4);
   }
 }
 

@@ -26,6 +26,32 @@ TEST(MachineRunsColumn, FarFromZeroKeepsItsSpread) {
   EXPECT_DOUBLE_EQ(column_spread(runs, 0).sd, std::sqrt(2.0 / 3));
 }
 
+// One run is cut into trials by its clock; the third trial begins anew.
+TEST(GoesOn, IsATrialThatBeginsAStepAfterTheOneBefore) {
+  MachineRuns runs;
+  double time = 0;
+  for (int t = 0; t < 3; ++t) {
+    MachineTrial& trial = runs.trials.emplace_back();
+    if (t == 2) time += 5;
+    for (int k = 0; k < 4; ++k, time += 0.5) {
+      MachineRow& row = trial.rows.emplace_back();
+      row.time = time;
+      row.seen = {0.1 * k};
+      row.inputs = {10.0 * t + k};
+    }
+  }
+  EXPECT_FALSE(goes_on(runs, 0));
+  EXPECT_TRUE(goes_on(runs, 1));
+  EXPECT_FALSE(goes_on(runs, 2));
+  const auto input = [&](std::size_t trial, std::size_t row, std::size_t steps) {
+    const RowPlace at = row_before(runs, trial, row, steps);
+    return runs.trials[at.trial].rows[at.row].inputs[0];
+  };
+  EXPECT_EQ(input(1, 3, 2), 11);
+  EXPECT_EQ(input(1, 1, 2), 3);
+  EXPECT_EQ(input(2, 1, 2), 20);
+}
+
 // A level has one sign. The last row of a trial begins no step, and may lack its input.
 TEST(MisreadRuns, HoldEachChangeOfEachColumn) {
   Machine machine = linear_machine(0.05);

@@ -121,5 +121,26 @@ TEST(MachineSimulation, ExperimentsDrawnTogetherAreThoseDrawnAlone) {
   }
 }
 
+// Whatever was measured, the state that the map lacks follows the state that is drawn.
+TEST(MachineSimulation, CarriesAStateThatTheMapLacks) {
+  Machine machine = linear_machine(0);
+  MachineHypothesis h = nominal_of(machine);
+  machine.parameters[2].lower = h.values[2] = 0;  // no noise
+  MachineRuns runs;
+  runs.trials.resize(1);
+  for (int k = 0; k < 20; ++k) runs.trials[0].rows.push_back({{2.0 + k}});
+  std::vector<double> ahead(19, 100.0);
+  ahead[0] = 0.5;
+  h.hidden = {{0, 0, 0.9, 0.2, ahead}};
+  const MachineRuns drawn = simulate_machine(machine, runs, h, 1);
+  double x = 2, hidden = 2.5;
+  for (const MachineRow& row : drawn.trials[0].rows) {
+    EXPECT_NEAR(row.seen[0], x, 1e-9);
+    const double apart = hidden - x;
+    x = 0.8 * x + 0.3 + 0.2 * apart;
+    hidden -= 0.1 * apart;
+  }
+}
+
 }  // namespace
 }  // namespace metastable::analysis::test

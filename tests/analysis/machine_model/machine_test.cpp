@@ -162,8 +162,8 @@ TEST_F(MachineNames, OfEffectsAreNotThoseOfAnyMachine) {
   machine.parameters = {{"pace", 1, 0.1}, {"pace_drift", 1, 0.1}};
   machine.may_vary = {"pace"};
   machine.inputs = {"load"};
-  for (const char* name :
-       {"memory", "outliers", "pace_spread", "pace_with_x", "lag_load", "sensor_noise_x", "launch_x"}) {
+  for (const char* name : {"memory", "outliers", "pace_spread", "pace_with_x", "lag_load", "filtered_load",
+                           "hidden_state_x", "sensor_noise_x", "launch_x"}) {
     machine.effects = {{name, {{"c", 0, -0.5, 0.5}}}};
     EXPECT_EQ(refused(), std::string("effects: \"") + name +
                              "\" is the name of an effect that any machine may have: give yours another");
@@ -234,6 +234,7 @@ TEST(MachineEffectUnit, IsThatOfWhatTheEffectChanges) {
   EXPECT_EQ(unit("sensor_bias_rate_rad_s", "bias"), "rad/s");
   EXPECT_EQ(unit("launch_spread_swing_rad", "sd_between_trials"), "rad");
   EXPECT_EQ(unit("outliers", "share"), "");
+  EXPECT_EQ(unit("hidden_state_swing_rad", "time_constant_steps"), "");
 }
 
 }  // namespace
