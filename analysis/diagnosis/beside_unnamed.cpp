@@ -123,7 +123,7 @@ std::optional<InPlace> in_place_of_effects(const TransitionModel& model, const C
                                            std::size_t facets, const DiagnosisOptions& options,
                                            const std::function<void()>& heartbeat) {
   const std::vector<const Candidate*> varying = variations_of(model);
-  if (varying.empty() || best.fit.terms.size() < 2 || !ranking.scan.trials_suffice) return {};
+  if (varying.empty() || best.fit.terms.size() < 2 || !ranking.scan.steps_suffice) return {};
   const double prior = std::log(options.rules.unnamed_alone / static_cast<double>(std::max<std::size_t>(1, facets)));
   std::optional<InPlace> found;
   double most = std::log(least_odds);
@@ -169,7 +169,7 @@ std::map<std::string, double> probabilities_beside_unnamed(const TransitionModel
                                                            const DiagnosisOptions& options,
                                                            const std::function<void()>& heartbeat) {
   const std::vector<const Candidate*> varying = variations_of(model);
-  if (varying.empty() || !ranking.scan.trials_suffice) return {};
+  if (varying.empty() || !ranking.scan.steps_suffice) return {};
   const EffectScan scan = scan_effects(model, best.fit, varying, options.threads);
   if (scan.effects.size() != varying.size()) return {};
   const Effort effort = effort_for(model, recalibrated);

@@ -218,7 +218,7 @@ Fitted fit_models(const TransitionModel& model, const std::vector<const Candidat
   fitted.given_map = gap_map(model, fitted.given, options.draws / 2, options.seed);
   progress(0.6, "where the gap lies");
   fitted.recalibrated_map = gap_map(model, fitted.recalibrated, options.draws, options.seed);
-  if (fitted.ranking.scan.trials_suffice)
+  if (fitted.ranking.scan.steps_suffice)
     fitted.variations = scan_variations(model, fitted.recalibrated, options.threads);
   return fitted;
 }
@@ -231,7 +231,7 @@ struct FoundGap {
 FoundGap find_gap(const TransitionModel& model, const Fitted& fitted, std::size_t candidates,
                   const DiagnosisOptions& options, const Progress& progress) {
   const Fit& recalibrated = fitted.recalibrated;
-  const bool suffice = fitted.ranking.scan.trials_suffice;
+  const bool suffice = fitted.ranking.scan.steps_suffice;
   FoundGap found;
   Diagnosis::Gap& gap = found.gap;
   gap.refitted = model.recalibrated();
@@ -239,8 +239,10 @@ FoundGap find_gap(const TransitionModel& model, const Fitted& fitted, std::size_
   gap.contact = contact_estimates(model, recalibrated);
   gap.as_given = fitted.given_map;
   gap.recalibrated = fitted.recalibrated_map;
+  gap.facets_tested = fitted.ranking.scan.trials_suffice;
+  gap.variations_tested = suffice && !fitted.variations.effects.empty();
   std::vector<LeftInFacet>& facets = found.alone.facets;
-  facets = left_by_facet(model, recalibrated, {}, options.rules);
+  if (gap.facets_tested || !suffice) facets = left_by_facet(model, recalibrated, {}, options.rules);
   GapPValues p{.recalibration = recalibration_p_value(model, fitted.given_slopes, fitted.gain()),
                .effects = fitted.ranking.p_value,
                .where = gap.recalibrated.p_value,
@@ -443,8 +445,7 @@ void say_question(Diagnosis& d, const std::string& question) {
   d.sentences.insert(d.sentences.begin() + static_cast<std::ptrdiff_t>(behind), std::string(opening) + question);
 }
 
-// Says behind the verdict which parameters lie far from what is stated of them. Of a gap without a name nothing else is
-// said to be refitted: more than that differs.
+// Says behind the verdict which parameters lie far from what is stated of them; of a gap without a name, that alone.
 void say_misstated(Diagnosis& d, const TransitionModel& model, const Fit& fit) {
   if (d.verdict == Verdict::no_gap) return;
   std::vector<std::string> said = model.misstated(fit);

@@ -162,6 +162,7 @@ struct Diagnosis {
     double p_where = 1;          ///< of the largest cell of the map
     double p_facets = 1;         ///< of the facet that has most left, its cells together, with the look elsewhere
     double p_variations = 1;     ///< of what varies most in a way that has no name, with the look elsewhere
+    bool facets_tested = true, variations_tested = true;  ///< false: these runs are too few or too short for that
     GapMap as_given, recalibrated, left;      ///< maps under the nominal, the refitted, and the chosen model
     std::string refitted;                     ///< what a recalibration refits (TransitionModel::recalibrated)
     std::string recalibration_id;             ///< TransitionModel::recalibration_id()

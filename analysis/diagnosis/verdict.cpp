@@ -62,9 +62,10 @@ std::vector<Joined> supposed_beside(const TransitionModel& model, const CauseRan
     if (joined.size() == most_beside || cause->evidence < top - beside_margin) break;
     if (!cause->fitted() || extends_likelier(*cause, ordered)) continue;
     const PhaseGain gained = phase_gain(model, cause->fit, exact_part(ranking.singles, cause->terms, recalibrated));
-    Unnamed one{{},
-                cause->evidence,
-                left_by_facet(model, cause->fit, {tolerated * gained.collisions, tolerated * gained.stances}, rules)};
+    Unnamed one{{}, cause->evidence, {}};
+    // Few trials, however long, do not show how cells of the map scatter.
+    if (ranking.scan.trials_suffice)
+      one.facets = left_by_facet(model, cause->fit, {tolerated * gained.collisions, tolerated * gained.stances}, rules);
     for (const EffectTerm& term : cause->terms) one.beside.push_back(term.candidate->id);
     if (joined.empty())
       std::ranges::move(variations_beside(model, cause->fit, tolerated * (gained.collisions + gained.stances), rules,
@@ -186,8 +187,8 @@ Chosen choose(const TransitionModel& model, const CauseRanking& ranking, const s
   const double all = best.fit.log_likelihood - recalibrated.log_likelihood;
   if (all > 0) chosen.bent = std::clamp((best.fit.log_likelihood - exact.log_likelihood) / all, 0.0, 1.0);
   std::vector<Joined> joined;
-  // Few trials cannot show that events scatter as they would by themselves: facets are then not judged.
-  if (ranking.scan.trials_suffice) {
+  // Few and short trials cannot show that events scatter as they would by themselves: facets are then not judged.
+  if (ranking.scan.steps_suffice) {
     joined = supposed_beside(model, ranking, ordered, recalibrated, options);
     chosen.unnamed = weigh_unnamed(alone, joined, ordered, rules);
   }

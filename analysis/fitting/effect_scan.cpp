@@ -242,6 +242,11 @@ Derivatives project(const TransitionModel& model, const Fit& fit, const Derivati
     scan.by_prior = scatter.asDiagonal() * weights;
   scan.trials_suffice =
       model.trials() >= Rules::enough_trials && model.events().size() >= Rules::enough_transitions * model.trials();
+  std::size_t steps = 0;
+  for (const std::size_t some : model.transitions()) steps += some;
+  scan.steps_suffice =
+      scan.trials_suffice || (model.trials() >= Rules::least_trials_to_explain &&
+                              steps >= std::max(Rules::enough_steps_in_all, Rules::enough_long_steps * model.trials()));
   // At the fit the nuisances' scores balance their prior's: the plain sum of the slopes is efficient already.
   scan.scores = all.slope.colwise().sum();
   return efficient;

@@ -38,6 +38,7 @@ struct EffectScan {
   Eigen::MatrixXd information;  ///< [columns x columns] efficient
   Eigen::VectorXd whole;        ///< [columns] its diagonal before the projection
   bool trials_suffice = true;   ///< to draw chance from them, by Rules::enough_trials and enough_transitions
+  bool steps_suffice = true;    ///< to seek what has no name: trials do, or steps by Rules::enough_long_steps
   /// Returns what it says of a candidate, null if that was not scanned.
   const ScannedEffect* find(const Candidate* candidate) const;
 };

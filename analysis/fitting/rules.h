@@ -109,6 +109,10 @@ struct Rules {
   /// Trials, and transitions of each on average, from whose scores chance levels are drawn. Measurement: with fewer own
   /// data raise alarms above their level (tests/benchmarks/own_data.py --few).
   static constexpr std::size_t enough_trials = 40, enough_transitions = 4;
+  /// Steps of each trial on average, and in all, from which fewer trials show what has no name, too: chance is then
+  /// what the model says, or more where trials scatter more. Measurement: 20 trials of 50 steps with an input that
+  /// pushes as strongly as the noise had a memory named with probability 1 without it.
+  static constexpr std::size_t enough_long_steps = 25, enough_steps_in_all = 400;
   /// Trials, and transitions in all of them, from which a gap is put down to a cause: contact parameters, an
   /// effect, or something without a name. Derivation: five transitions for each of the eight parameters that a
   /// hypothesis fits (means and sds of eta and mu, shape, noise, an effect's own), and as many trials as a trend among

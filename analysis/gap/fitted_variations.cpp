@@ -85,7 +85,7 @@ std::vector<double> promised_gains(const EffectScan& variations) {
 
 double variations_p_value(const EffectScan& variations, const std::vector<double>& gains, int draws,
                           std::uint64_t seed) {
-  if (gains.empty() || !variations.trials_suffice) return 1;
+  if (gains.empty() || !variations.steps_suffice) return 1;
   const ChanceGains chance(variations, draws, seed);
   double least = 1;
   for (std::size_t i = 0; i < gains.size(); ++i)

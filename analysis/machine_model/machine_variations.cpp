@@ -37,6 +37,13 @@ double wave(double share, std::size_t parameter) {
   return parameter % 2 == 0 ? std::cos(angle) : std::sin(angle);
 }
 
+// Returns an input of this step or of those before, then the square and the cube of this step's, without its line.
+double by_input(const StepPlace& at, std::size_t input, std::size_t part) {
+  if (part < input_lags) return at.inputs[input_lags * input + part];
+  const double x = std::clamp(at.inputs[input_lags * input], -4.0, 4.0);
+  return part == input_lags ? (x * x - 1) / std::numbers::sqrt2 : (x * x - 3) * x / std::sqrt(6.0);
+}
+
 std::vector<Facet> facets(const Machine& machine, const MachineDesign& design) {
   std::vector<Facet> all;
   // A parameter that differs between two values of a column is one number.
@@ -53,8 +60,8 @@ std::vector<Facet> facets(const Machine& machine, const MachineDesign& design) {
                    }});
   for (std::size_t i = 0; i < machine.inputs.size(); ++i)
     if (!design.inputs[i].by_phase)
-      all.push_back({machine.inputs[i], design.inputs[i].changes ? input_lags : 1,
-                     [i](const StepPlace& at, std::size_t lag) { return at.inputs[input_lags * i + lag]; }});
+      all.push_back({machine.inputs[i], design.inputs[i].changes ? 2 + input_lags : 1,
+                     [i](const StepPlace& at, std::size_t part) { return by_input(at, i, part); }});
   if (design.phases.size() > 1)
     all.push_back({"phase", design.phases.size() - 1,
                    [](const StepPlace& at, std::size_t i) { return at.phase == static_cast<int>(i) ? 1.0 : 0.0; },

@@ -240,8 +240,8 @@ Json gap_json(const analysis::Diagnosis::Gap& gap) {
           {"p_value_recalibration", number(gap.p_recalibration)},
           {"p_value_effects", number(gap.p_effects)},
           {"p_value_where", number(gap.p_where)},
-          {"p_value_facets", number(gap.p_facets)},
-          {"p_value_variations", number(gap.p_variations)}};
+          {"p_value_facets", gap.facets_tested ? number(gap.p_facets) : nullptr},
+          {"p_value_variations", gap.variations_tested ? number(gap.p_variations) : nullptr}};
 }
 
 Json missing_json(const analysis::MissingColumn& missing) {

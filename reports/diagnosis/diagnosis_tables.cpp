@@ -93,21 +93,25 @@ Table data_table(const Diagnosis& d) {
 }
 
 // Tests put together are factors above the 1e-12 at which each of them stops, and say no more than it does.
-Cell together(double p) { return p < 1e-11 ? Cell(NotShown{{p, p, p}, "< 10⁻¹¹"}) : Cell(p); }
+Cell together(double p, bool tested = true) {
+  if (!tested) return Cell("not tested");
+  return p < 1e-11 ? Cell(NotShown{{p, p, p}, "< 10⁻¹¹"}) : Cell(p);
+}
 
 Table gap_table(const Diagnosis& d) {
-  return {.id = "gap",
-          .title = "Is there a gap?",
-          .notes = {"p is the chance that a model that is right looks at least as wrong as this one does, in what its "
-                    "row says may be wrong."},
-          .columns = {{"model"}, {"what may be wrong"}, {"p", "", NumberFormat::p_value, 2}},
-          .rows = {{"as given", "anything", together(d.gap.p_as_given)},
-                   {"as given", "its parameters", together(d.gap.p_recalibration)},
-                   {"recalibrated", "anything else", together(d.gap.p_value)},
-                   {"recalibrated", "an effect of the catalogue", together(d.gap.p_effects)},
-                   {"recalibrated", "a cell of the map", together(d.gap.p_where)},
-                   {"recalibrated", "all cells of a facet", together(d.gap.p_facets)},
-                   {"recalibrated", "a variation without a name", together(d.gap.p_variations)}}};
+  return {
+      .id = "gap",
+      .title = "Is there a gap?",
+      .notes = {"p is the chance that a model that is right looks at least as wrong as this one does, in what its "
+                "row says may be wrong."},
+      .columns = {{"model"}, {"what may be wrong"}, {"p", "", NumberFormat::p_value, 2}},
+      .rows = {{"as given", "anything", together(d.gap.p_as_given)},
+               {"as given", "its parameters", together(d.gap.p_recalibration)},
+               {"recalibrated", "anything else", together(d.gap.p_value)},
+               {"recalibrated", "an effect of the catalogue", together(d.gap.p_effects)},
+               {"recalibrated", "a cell of the map", together(d.gap.p_where)},
+               {"recalibrated", "all cells of a facet", together(d.gap.p_facets, d.gap.facets_tested)},
+               {"recalibrated", "a variation without a name", together(d.gap.p_variations, d.gap.variations_tested)}}};
 }
 
 Table contact_table(const Diagnosis& d) {

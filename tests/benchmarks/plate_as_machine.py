@@ -9,6 +9,8 @@
     slow         the heater has a time constant of 1.96 rows
     late         the heater acts one row late
     memory       the noise remembers: a correlation of 0.5
+    saturated    the heater takes 3.5 of 5 V at most; no effect is that
+    dead         the heater does nothing below 0.5 V; no effect is that
 Trials begin anew, or ("cut") are one run that was cut by its clock.
 """
 
@@ -18,7 +20,7 @@ import time
 
 import numpy as np
 
-KINDS = ("none", "wall", "slow", "late", "memory")
+KINDS = ("none", "wall", "slow", "late", "memory", "saturated", "dead")
 
 
 def draw(kind, seed, cut, trials=20, rows=60):
@@ -40,7 +42,8 @@ def draw(kind, seed, cut, trials=20, rows=60):
             columns["trial"].append(trial)
             columns["time_s"].append(trial * rows + row if cut else 1000 * trial + row)
             slow = volt if len(given) == 1 else slow + 0.4 * (volt - slow)
-            heat = {"slow": slow, "late": given[-2:][0]}.get(kind, volt)
+            heat = {"slow": slow, "late": given[-2:][0], "saturated": min(volt, 3.5),
+                    "dead": max(volt - 0.5, 0)}.get(kind, volt)
             fresh = rng.normal()
             noise = 0.5 * noise + np.sqrt(0.75) * fresh if kind == "memory" else fresh
             drawn_back = 0.08 * (wall - plate) if kind == "wall" else 0

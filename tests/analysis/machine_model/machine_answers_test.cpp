@@ -246,6 +246,32 @@ TEST(MachineAnswers, NameAStateThatTheMapLacks) {
   }
 }
 
+// An actuator that saturates is no effect of the catalogue: few long trials show that something goes by its input.
+TEST(MachineAnswers, GiveNoNameToAnActuatorThatSaturates) {
+  Machine machine = linear_machine(0.05);
+  machine.inputs = {"command"};
+  machine.effects.clear();
+  machine.step = [](const MachineBatch& batch) {
+    for (std::size_t i = 0; i < batch.rows; ++i)
+      batch.next[i] = batch.value(0, i) * batch.states[i] + batch.value(1, i) * batch.value(3, i) +
+                      batch.value(2, i) * batch.scores[i];
+  };
+  constexpr std::size_t trials = 20, rows = 50;
+  const auto command = [](std::size_t t, std::size_t k) { return 2 * std::sin(1.3 * static_cast<double>(t * t + k)); };
+  std::size_t step = 0;
+  const auto next = [&](double x, double z, std::size_t t) {
+    return 0.8 * x + 0.3 * std::clamp(command(t, step++ % (rows - 1)), -1.0, 1.0) + 0.1 * z;
+  };
+  MachineRuns runs = scalar_runs(trials, rows, 0, 0.05, 3, next);
+  for (std::size_t t = 0; t < trials; ++t)
+    for (std::size_t k = 0; k < rows; ++k) runs.trials[t].rows[k].inputs = {command(t, k)};
+  const Diagnosis d = answer_to(machine, std::move(runs), {});
+  EXPECT_EQ(d.verdict, Verdict::unexplained) << told(d);
+  EXPECT_TRUE(d.gap.variations_tested);
+  EXPECT_FALSE(d.gap.facets_tested);
+  EXPECT_NE(told(d).find("acts by command"), std::string::npos) << told(d);
+}
+
 // Readings that are off alone, by 10 or 60 sds of the noise, and one of them in a first row.
 TEST(MachineAnswers, TakeGlitchesOfASensorForWildRows) {
   Machine machine = linear_machine(0.02);
