@@ -198,7 +198,8 @@ std::vector<Detectability> detectability(const EffectScan& scan, const std::vect
     const Eigen::MatrixXd own = scan.information.block(first, first, count, count);
     const double least = resolved_share * scan.whole[first];
     if (!(own(0, 0) > least)) {
-      v.undecidable = "these data hold no information on it";
+      v.undecidable = candidate->parameters[0].likely == 0 ? "these data hold no information on it"
+                                                           : "these data hold information on it far from none alone";
       continue;
     }
     set_smallest(v, *found, std::sqrt(rules.seen_gain / std::max(information_on_first(scan, own, first), least)));

@@ -213,7 +213,8 @@ Fitted fit_models(const TransitionModel& model, const std::vector<const Candidat
   fitted.visible = detectability(fitted.ranking.scan, candidates, options.rules);
   std::vector<RankedCause>& singles = fitted.ranking.singles;
   for (std::size_t i = 0; i < singles.size(); ++i)
-    if (singles[i].not_decided.empty() && !candidates[i]->parameters.empty() && fitted.visible[i].smallest == 0)
+    if (singles[i].not_decided.empty() && !candidates[i]->parameters.empty() && fitted.visible[i].smallest == 0 &&
+        candidates[i]->parameters[0].likely == 0)
       singles[i].not_decided = fitted.visible[i].undecidable;
   fitted.given_map = gap_map(model, fitted.given, options.draws / 2, options.seed);
   progress(0.6, "where the gap lies");
@@ -522,30 +523,6 @@ void ask_first(Diagnosis& d, const std::string& question) {
   say_question(d, question);
 }
 
-std::string verdict_name(Verdict verdict) {
-  switch (verdict) {
-    case Verdict::no_gap:
-      return "no_gap";
-    case Verdict::recalibrate:
-      return "recalibrate";
-    case Verdict::explained:
-      return "explained";
-    case Verdict::partly_explained:
-      return "partly_explained";
-    case Verdict::unexplained:
-      return "unexplained";
-  }
-  throw std::logic_error("verdict_name: unknown verdict");
-}
-
-Verdict verdict_from_name(std::string_view name) {
-  for (const Verdict verdict :
-       {Verdict::no_gap, Verdict::recalibrate, Verdict::explained, Verdict::partly_explained, Verdict::unexplained})
-    if (verdict_name(verdict) == name) return verdict;
-  throw std::invalid_argument(
-      fmt::format("verdict: \"{}\" is none of no_gap, recalibrate, explained, partly_explained, unexplained", name));
-}
-
 std::string Cause::name() const { return fmt::format("{}", fmt::join(effects, "+")); }
 
 Diagnosis diagnose(const TransitionModel& model, const DiagnosisOptions& options) {
@@ -557,7 +534,9 @@ Diagnosis diagnose(const TransitionModel& model, const DiagnosisOptions& options
   const Fitted fitted = fit_models(model, candidates, options, progress);
   Decided decided = decide(model, fitted, candidates, options, progress);
   // A gap without a name may come of an effect that fits missed, because no slope leads to its likely size.
-  if (decided.d.verdict == Verdict::unexplained || decided.d.verdict == Verdict::partly_explained) {
+  // Another gap may, where the data hold nothing of an effect at none.
+  if (decided.d.verdict == Verdict::unexplained || decided.d.verdict == Verdict::partly_explained ||
+      (decided.d.verdict != Verdict::no_gap && any_flat(candidates, fitted.ranking.singles))) {
     const std::vector<Candidate> far =
         with_far_sizes(model, fitted.recalibrated, candidates, fitted.ranking.singles, options.rules, options.threads,
                        [&] { progress(0.86, "what may lie far from none"); });

@@ -6,6 +6,7 @@
 #include <boost/math/distributions/chi_squared.hpp>
 #include <cmath>
 #include <iterator>
+#include <stdexcept>
 #include <string>
 #include <utility>
 
@@ -316,6 +317,30 @@ Named corrected(Named named, const std::map<std::string, double>& beside, double
   named.set.clear();
   named.alike.clear();
   return named;
+}
+
+std::string verdict_name(Verdict verdict) {
+  switch (verdict) {
+    case Verdict::no_gap:
+      return "no_gap";
+    case Verdict::recalibrate:
+      return "recalibrate";
+    case Verdict::explained:
+      return "explained";
+    case Verdict::partly_explained:
+      return "partly_explained";
+    case Verdict::unexplained:
+      return "unexplained";
+  }
+  throw std::logic_error("verdict_name: unknown verdict");
+}
+
+Verdict verdict_from_name(std::string_view name) {
+  for (const Verdict verdict :
+       {Verdict::no_gap, Verdict::recalibrate, Verdict::explained, Verdict::partly_explained, Verdict::unexplained})
+    if (verdict_name(verdict) == name) return verdict;
+  throw std::invalid_argument(
+      fmt::format("verdict: \"{}\" is none of no_gap, recalibrate, explained, partly_explained, unexplained", name));
 }
 
 }  // namespace metastable::analysis

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <functional>
+#include <limits>
 #include <utility>
 
 #include "analysis/fitting/cause_ranking.h"
@@ -15,7 +16,10 @@ namespace {
 
 // These numbers save time.
 constexpr double far_shares[]{1.0 / 32, 1.0 / 8, 1.0 / 2};  // of the way from none to a bound: sizes that are tried
-constexpr std::size_t most_far = 2;                         // effects that are refined: the likeliest at these sizes
+// Where the data hold nothing at none, as beyond all values of an input that may saturate, these are tried with the
+// recalibrated parameters refitted: those without the effect imitate it.
+constexpr double flat_shares[]{1.0 / 8, 1.0 / 4, 1.0 / 2, 3.0 / 4, 15.0 / 16};
+constexpr std::size_t most_far = 2;            // effects that are refined: the likeliest at these sizes
 constexpr int far_passes = 2, far_rounds = 4;  // Rounds about the best size are each three times as fine as the last.
 
 // A likelihood is a staircase if its third difference near the top exceeds so many nats, where smooth ones have none.
@@ -56,6 +60,22 @@ class FarSearch {
     const std::vector<double> likely = likely_with(nuisance, sizes);
     const auto best = std::ranges::max_element(likely);
     return {sizes[static_cast<std::size_t>(best - likely.begin())], *best};
+  }
+
+  // Returns the same of other sizes, with the recalibrated parameters as they are beside each.
+  std::pair<double, double> likeliest_refitted(const std::vector<double>& nuisance) const {
+    const FreeParameter& p = candidate_.parameters[0];
+    std::pair<double, double> best{p.neutral, -std::numeric_limits<double>::infinity()};
+    for (const double share : flat_shares)
+      for (const double end : {p.lower, p.upper}) {
+        if (end == p.neutral) continue;
+        if (heartbeat_) heartbeat_();
+        const double size = p.neutral + share * (end - p.neutral);
+        const EffectTerm term{&candidate_, candidate_.variants.front(), {size}};
+        const double likely = fit(model_, nuisance, {term}, {.count = {}, .refit_effects = false}).log_likelihood;
+        if (likely > best.second) best = {size, likely};
+      }
+    return best;
   }
 
   // Sets the likely size, which it seeks in ever finer steps about a size that is likelier than none, and returns the
@@ -102,7 +122,17 @@ class FarSearch {
   const std::function<void()>& heartbeat_;
 };
 
+bool is_flat(const Candidate& candidate, const RankedCause& single) {
+  return candidate.seek_far && candidate.undecidable.empty() && !single.not_decided.empty();
+}
+
 }  // namespace
+
+bool any_flat(const std::vector<const Candidate*>& candidates, const std::vector<RankedCause>& singles) {
+  for (std::size_t i = 0; i < candidates.size(); ++i)
+    if (is_flat(*candidates[i], singles[i])) return true;
+  return false;
+}
 
 std::vector<Candidate> with_far_sizes(const TransitionModel& model, const Fit& recalibrated,
                                       const std::vector<const Candidate*>& candidates,
@@ -116,7 +146,9 @@ std::vector<Candidate> with_far_sizes(const TransitionModel& model, const Fit& r
   std::vector<FarSize> far;
   for (std::size_t i = 0; i < candidates.size(); ++i) {
     if (!candidates[i]->seek_far) continue;
-    const auto [size, likely] = FarSearch(model, *candidates[i], threads, heartbeat).likeliest(recalibrated.nuisance);
+    const FarSearch search(model, *candidates[i], threads, heartbeat);
+    const auto [size, likely] = is_flat(*candidates[i], singles[i]) ? search.likeliest_refitted(recalibrated.nuisance)
+                                                                    : search.likeliest(recalibrated.nuisance);
     if (likely > recalibrated.log_likelihood + told_apart) far.push_back({i, size, likely});
   }
   std::ranges::stable_sort(far, std::ranges::greater{}, &FarSize::likely);

@@ -115,7 +115,7 @@ TEST(DiagnosisSentences, OneLongTrialMayBeCut) {
 
 }  // namespace
 
-// What an answer asks and notes about the runs of a machine, and when it does not.
+// The runs are asked about and noted where something is wrong with them, and not where nothing is.
 
 namespace test {
 namespace {

@@ -190,18 +190,27 @@ TEST(MachineAnswers, AskAboutGlitchesAndFailuresThatTheModelLacks) {
   }));
 }
 
-// A command acts one step after it was given, as through an actuator that lags; a sensor that errs more says less.
-TEST(MachineAnswers, NameAnInputThatActsLate) {
+// Makes a machine whose state follows a command. @param suspected  that its actuator saturates, below its range at most
+Machine commanded_machine(bool suspected) {
   Machine machine = linear_machine(0.05);
   machine.inputs = {"command"};
   machine.parameters = {{"a", 0.7, 0.05}, {"pull", 0.5, 0.05}, {"s", 0.1, 0.02, 0.01, 1}};
   machine.may_vary = {"pull"};
   machine.effects.clear();
-  machine.step = [](const MachineBatch& batch) {
-    for (std::size_t i = 0; i < batch.rows; ++i)
-      batch.next[i] = batch.value(0, i) * batch.states[i] + batch.value(1, i) * batch.value(3, i) +
+  if (suspected) machine.effects = {{"saturation", {{"limit", 5, 0.2, 5}}}};
+  machine.step = [suspected](const MachineBatch& batch) {
+    for (std::size_t i = 0; i < batch.rows; ++i) {
+      const double most = suspected ? batch.value(3, i) : 5, command = batch.value(suspected ? 4 : 3, i);
+      batch.next[i] = batch.value(0, i) * batch.states[i] + batch.value(1, i) * std::clamp(command, -most, most) +
                       batch.value(2, i) * batch.scores[i];
+    }
   };
+  return machine;
+}
+
+// A command acts one step after it was given, as through an actuator that lags, or through a filter.
+TEST(MachineAnswers, NameAnInputThatActsLate) {
+  const Machine machine = commanded_machine(false);
   constexpr std::size_t trials = 30, rows = 15;
   const auto command = [](std::size_t t, std::size_t k) { return std::sin(1.3 * static_cast<double>(t * t + k)); };
   for (const std::string cause : {"", "lag_command", "filtered_command"}) {
@@ -247,29 +256,25 @@ TEST(MachineAnswers, NameAStateThatTheMapLacks) {
 }
 
 // An actuator that saturates is no effect of the catalogue: few long trials show that something goes by its input.
-TEST(MachineAnswers, GiveNoNameToAnActuatorThatSaturates) {
-  Machine machine = linear_machine(0.05);
-  machine.inputs = {"command"};
-  machine.effects.clear();
-  machine.step = [](const MachineBatch& batch) {
-    for (std::size_t i = 0; i < batch.rows; ++i)
-      batch.next[i] = batch.value(0, i) * batch.states[i] + batch.value(1, i) * batch.value(3, i) +
-                      batch.value(2, i) * batch.scores[i];
-  };
+// Where it is suspected it is found, though nothing saturates at the neutral value.
+TEST(MachineAnswers, NameAnActuatorThatSaturatesWhereItIsSuspected) {
   constexpr std::size_t trials = 20, rows = 50;
   const auto command = [](std::size_t t, std::size_t k) { return 2 * std::sin(1.3 * static_cast<double>(t * t + k)); };
   std::size_t step = 0;
   const auto next = [&](double x, double z, std::size_t t) {
-    return 0.8 * x + 0.3 * std::clamp(command(t, step++ % (rows - 1)), -1.0, 1.0) + 0.1 * z;
+    return 0.7 * x + 0.5 * std::clamp(command(t, step++ % (rows - 1)), -1.0, 1.0) + 0.1 * z;
   };
   MachineRuns runs = scalar_runs(trials, rows, 0, 0.05, 3, next);
   for (std::size_t t = 0; t < trials; ++t)
     for (std::size_t k = 0; k < rows; ++k) runs.trials[t].rows[k].inputs = {command(t, k)};
-  const Diagnosis d = answer_to(machine, std::move(runs), {});
-  EXPECT_EQ(d.verdict, Verdict::unexplained) << told(d);
-  EXPECT_TRUE(d.gap.variations_tested);
-  EXPECT_FALSE(d.gap.facets_tested);
-  EXPECT_NE(told(d).find("acts by command"), std::string::npos) << told(d);
+  const Diagnosis without = answer_to(commanded_machine(false), runs, {});
+  EXPECT_EQ(without.verdict, Verdict::unexplained) << told(without);
+  EXPECT_TRUE(without.gap.variations_tested);
+  EXPECT_FALSE(without.gap.facets_tested);
+  EXPECT_NE(told(without).find("acts by command"), std::string::npos) << told(without);
+  const Diagnosis d = answer_to(commanded_machine(true), runs, {});
+  ASSERT_EQ(d.causes.set, std::vector<std::string>{"saturation"}) << told(d);
+  EXPECT_NEAR(d.causes.ranked.front().parameters[0][0].value, 1, 0.05);
 }
 
 // Readings that are off alone, by 10 or 60 sds of the noise, and one of them in a first row.
