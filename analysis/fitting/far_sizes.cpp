@@ -16,8 +16,8 @@ namespace {
 
 // These numbers save time.
 constexpr double far_shares[]{1.0 / 32, 1.0 / 8, 1.0 / 2};  // of the way from none to a bound: sizes that are tried
-// Where the data hold nothing at none, as beyond all values of an input that may saturate, these are tried with the
-// recalibrated parameters refitted: those without the effect imitate it.
+// The likelihood of an effect may be flat at none: a limit of an actuator changes nothing beyond all recorded inputs.
+// These sizes are then tried, each with the recalibrated parameters refitted, since those may have imitated the effect.
 constexpr double flat_shares[]{1.0 / 8, 1.0 / 4, 1.0 / 2, 3.0 / 4, 15.0 / 16};
 constexpr std::size_t most_far = 2;            // effects that are refined: the likeliest at these sizes
 constexpr int far_passes = 2, far_rounds = 4;  // Rounds about the best size are each three times as fine as the last.

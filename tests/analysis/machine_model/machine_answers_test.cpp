@@ -255,8 +255,8 @@ TEST(MachineAnswers, NameAStateThatTheMapLacks) {
   }
 }
 
-// An actuator that saturates is no effect of the catalogue: few long trials show that something goes by its input.
-// Where it is suspected it is found, though nothing saturates at the neutral value.
+// An actuator that saturates is no effect of the catalogue: few long trials show that something goes by its input. A
+// user who suspects it gets its name, though nothing saturates at the neutral value.
 TEST(MachineAnswers, NameAnActuatorThatSaturatesWhereItIsSuspected) {
   constexpr std::size_t trials = 20, rows = 50;
   const auto command = [](std::size_t t, std::size_t k) { return 2 * std::sin(1.3 * static_cast<double>(t * t + k)); };
